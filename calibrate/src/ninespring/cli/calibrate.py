@@ -54,14 +54,9 @@ def calibrate(
     simulate: bool,
     output: Path,
     array_path: Path | None,
-    duration: float | None,
-    drive_for: float | None,
-    pattern: str | None,
-    current: float | None,
-    supply: float | None,
-    hottest: float | None,
     yes: bool,
     json_path: Path | None,
+    **wanted: float | str | None,
 ) -> None:
     """From a board as it is to one that knows its array: all seven commands of docs/calibrating.md in one.
 
@@ -86,21 +81,12 @@ def calibrate(
     kept = output / ARRAY_FILE if begun and (output / ARRAY_FILE).exists() else array_path
     array = read_array(kept) if kept else Array()
     array.one_layer("a board drives")
-    if pattern is not None:
-        pattern_of(pattern, array)
+    if wanted["pattern"] is not None:
+        pattern_of(str(wanted["pattern"]), array)
     if output.is_dir() and not begun and any(output.iterdir()):
         raise InputError("is there, and no calibration was begun in it: give another folder, -o", output)
-    given = {
-        "simulate": simulate,
-        # another one in its place would be another calibration
-        "array": array_path.read_text("utf-8") if array_path else None,
-        "duration": duration,
-        "drive_for": drive_for,
-        "pattern": pattern,
-        "current": current,
-        "supply": supply,
-        "hottest": hottest,
-    }
+    # another array in its place would be another calibration
+    given = {"simulate": simulate, "array": array_path.read_text("utf-8") if array_path else None, **wanted}
     if not begun:
         middle = "".join("1" if one else "0" for one in patterns(array.springs)[0])
         given = FROM | {"pattern": middle} | {name: value for name, value in given.items() if value is not None}

@@ -173,12 +173,9 @@ def two_ports(port: str | None, thermometers: str | None) -> None:
         raise InputError(f"--thermometers {thermometers}: that is the board's port, a logger has its own")
 
 
-def array_and_runs(array: Array | None, logs: tuple[Path, ...], or_resistance: bool = False) -> tuple[Array, list[Run]]:
-    """Read logs of one array; refuse what does not go together or is no measurement.
-
-    `or_resistance`: logs of currents and voltages need no temperature.
-    """
-    runs = [read_log(path, array.springs if array else None, or_resistance=or_resistance) for path in logs]
+def array_and_runs(array: Array | None, logs: tuple[Path, ...]) -> tuple[Array, list[Run]]:
+    """Read logs of one array, with temperatures or with voltages; refuse what does not go together or is no measurement."""
+    runs = [read_log(path, array.springs if array else None, or_resistance=True) for path in logs]
     array = array_of(array, runs)
     if len({bool(np.isfinite(run.temperature_c).any()) for run in runs}) > 1:
         raise InputError("some of these logs have temperatures and others none: give one kind at a time", logs[0])

@@ -66,7 +66,7 @@ def diagnose(
             told, made = steady.diagnose_table(logs[0], model, array or Array(), frozen, say)
         page = report.steady_report(told)
     else:
-        array, runs = array_and_runs(array, logs, or_resistance=True)
+        array, runs = array_and_runs(array, logs)
         if from_resistance.has_none(runs):
             if model_path:
                 raise InputError("without a thermometer give logs and an array only, no --model", logs[0])

@@ -64,7 +64,7 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     for path in logs:
         if steady.is_steady(path):
             raise InputError("a steady table: `ninespring diagnose` fits it, effect by effect", path, 1)
-    array, runs = array_and_runs(model_and_array(None, array_path)[1], logs, or_resistance=True)
+    array, runs = array_and_runs(model_and_array(None, array_path)[1], logs)
     notes_of(runs)
     if from_resistance.has_none(runs):
         if wanted:

@@ -34,7 +34,6 @@ from .cut import left_of
 from .progress import Progress
 
 RUNS = ("run1", "run2")
-STEPS = ("board", "plan", "run1", "diagnose", "run2", "verify", "export", "before", "after")
 DIAGNOSIS = "diagnosis"
 SETTINGS, OLD_SETTINGS = "settings.txt", "settings-before.txt"
 OWN = ("policy", "open_current_a", "host_timeout_s", "telemetry_format", "telemetry_hz")

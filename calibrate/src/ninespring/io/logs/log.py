@@ -157,8 +157,9 @@ def read_log(
     `temperatures`: refuse a log without any, unless `or_resistance` and it has currents and voltages.
     """
     table = Table(path)
-    needed = temperatures and not (or_resistance and any(COLUMN.match(n) and n[0] == "v" for n in table.names))
-    letter, count, has_voltages = _driving_columns(table, springs, needed, why)
+    kinds = {found[1] for name in table.names if (found := COLUMN.match(name))}
+    wanted = temperatures and not (or_resistance and {"i", "v"} <= kinds and "t" not in kinds)
+    letter, count, has_voltages = _driving_columns(table, springs, wanted, why)
     table.read_rows()
     _check_cells(table)
     notes: list[str] = []
@@ -175,11 +176,7 @@ def read_log(
     run.warm = mending.begins_warm(run)
     run.rounding_c = rounding(run.temperature_c, run.starts)
     mending.doubt_units(run)
-    if (
-        temperatures
-        and not (or_resistance and run.voltage_v is not None and len(without) == count)
-        and not np.isfinite(run.temperature_c).any()
-    ):
+    if wanted and not np.isfinite(run.temperature_c).any():
         why = f" ({notes[-1]})" if notes else ""
         raise table.refuse(f"no usable temperature in the whole log{why}")
     return run
