@@ -107,16 +107,6 @@ def test_the_settings_of_an_effect_are_found_without_a_list() -> None:
     assert made.written["wake_direction"] == "2"
 
 
-def wrong(tmp_path: Path) -> Path:
-    """Return a model whose chip would drive badly: it takes the transformation for 30 K lower than the array's."""
-    model = Model(Array(), ["latent_heat", "resistance_phase"])
-    model.parameters = {"heat_capacity_j_per_k": 0.3, "loss_w_per_k": 0.0058}
-    model.stderr = {"heat_capacity_j_per_k": 0.001, "loss_w_per_k": 0.0001}
-    path = tmp_path / "wrong.toml"
-    path.write_text(model_text(model))
-    return path
-
-
 def test_a_board_is_told_what_resistance_another_wire_has(cold: Path) -> None:
     model = read_model(cold)
     assert not [name for name in settings_of(model).written if name.endswith("imum_ohm")]
@@ -133,8 +123,9 @@ def test_a_board_is_told_what_resistance_another_wire_has(cold: Path) -> None:
 def test_settings_that_drive_worse_are_refused_and_written_only_by_force(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path, out = wrong(tmp_path), tmp_path / "s.txt"
-    made = settings_of(read_model(path))
+    model, path, out = Model(Array(), ["latent_heat", "resistance_phase"]), tmp_path / "m.toml", tmp_path / "s.txt"
+    path.write_text(model_text(model))
+    made = settings_of(model)
     made.written |= {"loss_w_per_k": "0.002000"}  # too little power to hold anything
     monkeypatch.setattr("ninespring.export.drive.settings_of", lambda model: made)
     code, said = ended("export", "--model", path, "-o", out)
