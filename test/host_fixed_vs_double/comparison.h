@@ -1,7 +1,6 @@
-/* What it is for: fixed point against double over random parameter sets and an hour of random
- * drive each.
- * What it owns: the drawing of sets and drives, seeded.
- * What it never does: choose sets by their outcome. */
+/* What it is for: the chip's fixed point against the plant's double precision, over random
+ * parameter sets and an hour of random drive each. What it owns: the drawing of sets and drives,
+ * seeded. What it never does: choose sets by their outcome. */
 #ifndef COMPARISON_H
 #define COMPARISON_H
 
