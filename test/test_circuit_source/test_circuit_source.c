@@ -277,33 +277,6 @@ TEST(supply_that_steps_is_learnt_anew)
     }
 }
 
-/* A bit of RAM turns over in any number: within some heatings all is as it was. */
-TEST(whatever_turns_over_is_learnt_again)
-{
-    const true_t is = {5000, 390};
-    float *const numbers[] = {&source.supply_mv,   &source.drop_mv,   &source.step_mv,
-                              &source.unsure_mv,   &source.less_mv,   &source.more_mv,
-                              &source.more_drop_v, &source.duty,      &source.voltage_mv,
-                              &source.before,      &source.mean_duty, &source.mean_mv,
-                              &source.duty_square, &source.duty_mv};
-    const float wrong[] = {NAN, INFINITY, -INFINITY, -1e30f, 1e30f, 0.0f};
-    for (unsigned n = 0; n < ROWS(numbers); n++) {
-        for (unsigned k = 0; k < ROWS(wrong); k++) {
-            setUp();
-            rounds(8, 9, is, 230.0f);
-            rounds(8, 9, is, 110.0f);
-            *numbers[n] = wrong[k];
-            for (unsigned heating = 0; heating < 12; heating++) {
-                rounds(8, 9, is, 230.0f);
-                rounds(8, 9, is, 110.0f);
-            }
-            TEST_ASSERT_FLOAT_WITHIN(30.0f, 390.0f, source.drop_mv);
-            TEST_ASSERT_FLOAT_WITHIN(25.0f, behind_mv(is, 110.0f), expected_mv(110.0f));
-            TEST_ASSERT_TRUE(source.unsure_mv < 60.0f && source.less_mv < 60.0f);
-        }
-    }
-}
-
 /* It forgets levels within rounds, and how much both moved only by what moves. */
 TEST(a_hold_forgets_a_supply_and_keeps_a_drop)
 {
@@ -341,21 +314,4 @@ TEST(small_changes_are_not_worth_another_belief)
     TEST_ASSERT_EQUAL_FLOAT(before.step_mv, source.step_mv);
     TEST_ASSERT_TRUE(rounds(1, 9, (true_t){4500, 390}, 110.0f) ||
                      rounds(1, 9, (true_t){4500, 390}, 110.0f));
-}
-
-/* One of nine shows a half of its voltage: the others hardly notice. */
-TEST(one_that_lies_moves_little)
-{
-    const true_t is = {5000, 390};
-    for (unsigned n = 0; n < 20; n++) {
-        const float duty = n < 8 ? 230.0f : 110.0f;
-        for (unsigned k = 0; k < 9; k++) {
-            circuit_source_take(&source, duty, (k == 0 ? 0.5f : 1.0f) * behind_mv(is, duty));
-        }
-        (void)circuit_source_fit(&source, &circuit);
-    }
-    TEST_ASSERT_FLOAT_WITHIN(0.07f * behind_mv(is, 230.0f), behind_mv(is, 230.0f),
-                             expected_mv(230.0f));
-    TEST_ASSERT_FLOAT_WITHIN(0.07f * behind_mv(is, 110.0f), behind_mv(is, 110.0f),
-                             expected_mv(110.0f));
 }

@@ -152,28 +152,6 @@ TEST(missing_readings_neither_count_nor_forgive)
     TEST_ASSERT_EQUAL(SAFETY_FAULT_SHORT_SPRING, safety_fault(&safety, 4));
 }
 
-/* A condition that takes over from another is counted from where that one ends. */
-TEST(condition_that_follows_another_trips_in_its_own_time)
-{
-    safety_sample_t low = running;
-    low.voltage_mv = 0;
-    safety_sample_t both = low;
-    both.current_ma = 3160;
-    safety_sample_t high = running;
-    high.voltage_mv = 4000;
-    uint8_t limit = parameters.bad_samples;
-    ticks(4, &low, limit - 2u);
-    ticks(4, &both, 1); /* still the first of them */
-    ticks(4, &high, limit - 1u);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 4));
-    ticks(4, &high, 1);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_HIGH_RESISTANCE, safety_fault(&safety, 4));
-    safety_clear(&safety);
-    ticks(4, &low, limit - 1u);
-    ticks(4, &both, 1);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_SHORT_SPRING, safety_fault(&safety, 4));
-}
-
 TEST(the_first_fault_is_kept)
 {
     safety_sample_t sample = running;
@@ -202,25 +180,6 @@ TEST(sum_above_the_supply_trips_everything)
     TEST_ASSERT_FALSE(safety_allows(&safety, 0));
     safety_clear(&safety);
     TEST_ASSERT_TRUE(safety_allows(&safety, 0));
-}
-
-/* Frozen at what flowed: neither a current in a spring that is off nor a fault of the board, until
- * it shows another. */
-TEST(frozen_sensor_is_no_current_in_a_spring_that_is_off)
-{
-    ticks(4, &running, 10);
-    safety_trip(&safety, 4, SAFETY_FAULT_SENSOR_MISMATCH);
-    safety_sample_t sample = running;
-    sample.expected_ma = 0;
-    sample.off = true;
-    ticks(4, &sample, 100);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, safety_fault(&safety, 4));
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
-    TEST_ASSERT_FALSE(safety_tick_spring(&safety, 4, &sample));
-    sample.current_ma++; /* it lives: that current flows */
-    TEST_ASSERT_TRUE(safety_tick_spring(&safety, 4, &sample));
-    ticks(4, &sample, parameters.bad_samples - 1u);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
 }
 
 /* Switched off before anything was noticed; and it freezes no less for being cleared. */
@@ -282,33 +241,6 @@ TEST(current_without_duty_overrides_every_other_fault)
         safety_emergency_stop(&safety);
         TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
     }
-}
-
-/* Near misses: a reading of which a part is of the moment before, an offset, noise around the
- * limit.
- */
-TEST(what_is_no_current_without_duty_is_no_fault)
-{
-    safety_sample_t sample = running;
-    for (uint8_t pulse = 0; pulse < 20; pulse++) {
-        sample = running;
-        ticks(4, &sample, 10);
-        sample.expected_ma = 0;
-        ticks(4, &sample, 1);
-        sample = off;
-        sample.current_ma = 90;
-        ticks(4, &sample, 20);
-        for (uint8_t n = 0; n < 5; n++) { /* a reading that is disturbed now and then */
-            sample.current_ma = 300;
-            ticks(4, &sample, 1);
-            sample.current_ma = 95;
-            ticks(4, &sample, SAFETY_FORGET_TICKS + 1u);
-        }
-        sample.current_ma = -2000;
-        ticks(4, &sample, 20);
-    }
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 4));
 }
 
 /* A switch that closes for a tick now and then: by the third the supply goes, however many good
@@ -585,16 +517,6 @@ TEST(a_good_tick_and_clear_begin_every_count_anew)
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 4));
     ticks(4, &was, 1);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, safety_fault(&safety, 4));
-}
-
-TEST(only_a_reading_that_is_one_is_said_to_be_valid)
-{
-    safety_sample_t sample = running;
-    TEST_ASSERT_TRUE(safety_tick_spring(&safety, 4, &sample));
-    for (uint8_t status = 1; status <= 4; status++) {
-        sample.sensor_status = status;
-        TEST_ASSERT_FALSE(safety_tick_spring(&safety, 4, &sample));
-    }
 }
 
 /* One tick that shows another current, and what it shows after that flows, though it be the same as
