@@ -60,7 +60,11 @@ TEST(a_welded_switch_heats_until_the_supply_is_off)
                             : "switch of a spring that is off closed",
                      LIMIT_MS);
         TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_STUCK_ON, mega.view().board_fault);
-        mega.expect_says("faults", "supply: off\r\n");
+        TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_STUCK_ON, mega.view().spring[4].fault);
+        const std::string faults = mega.say("faults");
+        expect_in(faults, "board: fault 11 stuck_on: cut the supply\r\n");
+        expect_in(faults, "spring 5: fault 11 stuck_on");
+        expect_in(faults, "supply: off\r\n");
         mega.expect_error("supply on", 11);
 
         mega.expect_ok("clear"); /* and nothing comes back by that */
