@@ -238,6 +238,23 @@ TEST(change_of_resistance_is_learnt_whatever_is_declared)
     }
 }
 
+/* Whichever way it came there, and never fully on: by its own martensite's resistance. */
+TEST(levels_one_after_the_other_are_held)
+{
+    static const uint16_t levels[] = {500, 250, 800, 400, 600};
+    for (int n = 0; n < 3; n++) {
+        plant_set(plant, "loss_w_per_k", 5.8e-3 * (0.85 + 0.15 * n));
+        plant_reset(plant);
+        start_cold();
+        for (unsigned j = 0; j < ROWS(levels); j++) {
+            want(CENTRE, levels[j]);
+            (void)run(120.0);
+            here("loss %d, %u permille: %.3f", n, levels[j], phase(CENTRE));
+            TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.001 * levels[j], phase(CENTRE));
+        }
+    }
+}
+
 /* Springs 1 and 9 are never driven, the others in two gangs against each other. */
 static void toggle(double period_s, double seconds, double limit_c)
 {

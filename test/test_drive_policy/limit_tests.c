@@ -4,7 +4,6 @@
 #include <stdio.h>
 
 #include "../run_tests.h"
-#include "derating.h"
 #include "small_array.h"
 #include "spring_estimator_internal.h"
 #include "supply_share.h"
@@ -13,17 +12,6 @@
 #define FULL_MA     3000
 
 /* ---- derating ---- */
-
-TEST(share_falls_linearly_over_the_band)
-{
-    TEST_ASSERT_EQUAL_FLOAT(1.0f, derating_share(20.0f, 110.0f, 10.0f));
-    TEST_ASSERT_EQUAL_FLOAT(1.0f, derating_share(100.0f, 110.0f, 10.0f));
-    TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.25f, derating_share(107.5f, 110.0f, 10.0f));
-    TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.05f, derating_share(109.5f, 110.0f, 10.0f));
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, derating_share(110.0f, 110.0f, 10.0f));
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, derating_share(1e6f, 110.0f, 10.0f));
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, derating_share(NAN, 110.0f, 10.0f));
-}
 
 /* Wherever it is: the eight around it, and no other. */
 TEST(all_around_an_undriven_spring_are_derated)
@@ -131,7 +119,7 @@ TEST(restart_leaves_nothing_driven_and_nothing_owed)
     for (uint8_t k = 0; k < SPRINGS; k++) {
         level[k] = 1000;
     }
-    (void)run(3.0);
+    decisions(ROUND_TICKS);
     policy.overload_quarters = 7;
     TEST_ASSERT_TRUE(policy.queue.count > 0);
     TEST_ASSERT_TRUE(drive_policy_init(&policy, &parameters, &model, NULL));
@@ -173,24 +161,12 @@ TEST(queue_keeps_each_once_in_order)
     TEST_ASSERT_EQUAL_UINT8(THERMAL_MODEL_MAX_SPRINGS, queue.count);
 }
 
-TEST(boosts_are_served_in_turn_after_what_is_secured)
+static uint32_t random_state;
+
+static uint32_t random_below(uint32_t limit)
 {
-    supply_queue_t queue = {0};
-    supply_claim_t claim[SPRINGS] = {{0, 0}};
-    uint16_t granted_ma[SPRINGS];
-    supply_queue_add(&queue, 3);
-    supply_queue_add(&queue, 0);
-    supply_queue_add(&queue, 5);
-    claim[8] = (supply_claim_t){1500, 1500}; /* holds */
-    claim[0] = (supply_claim_t){3000, 1000}; /* keeps what it has */
-    claim[3] = claim[5] = (supply_claim_t){3000, 0};
-    supply_share(&queue, claim, SPRINGS, 7000, granted_ma);
-    TEST_ASSERT_EQUAL_UINT16(1500, granted_ma[8]);
-    TEST_ASSERT_EQUAL_UINT16(3000, granted_ma[3]);
-    TEST_ASSERT_EQUAL_UINT16(2500, granted_ma[0]);
-    TEST_ASSERT_EQUAL_UINT16(0, granted_ma[5]);
-    supply_share(&queue, claim, SPRINGS, 7600, granted_ma); /* 100 mA are not worth it */
-    TEST_ASSERT_EQUAL_UINT16(0, granted_ma[5]);
+    random_state = random_state * 1664525u + 1013904223u;
+    return (random_state >> 8) % limit;
 }
 
 /* What is secured is cut alike where it is too much, to less than 1 mA each below what fits. */
@@ -219,4 +195,46 @@ TEST(cap_fits_and_wastes_less_than_a_milliampere_each)
             TEST_ASSERT_TRUE(granted_ma[k] == highest_ma || granted_ma[k] == claim[k].asked_ma);
         }
     }
+}
+
+TEST(boosts_are_staggered_not_diluted)
+{
+    begin_cold(3, 3);
+    for (uint8_t k = 0; k < SPRINGS; k++) {
+        level[k] = 1000;
+    }
+    decisions(ROUND_TICKS);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(14800u /* of 15 A the reserve */, decide());
+    unsigned full = 0, none = 0;
+    for (uint8_t k = 0; k < SPRINGS; k++) {
+        full += target_ma[k] > (unsigned)FULL_MA - parameters.dither_ma / 4u;
+        none += target_ma[k] == 0;
+        if (target_ma[k] == 0) {
+            TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_SUPPLY, drive_policy_limits(&policy, k));
+            TEST_ASSERT_EQUAL_UINT16((unsigned)FULL_MA, drive_policy_cut_ma(&policy, k));
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT(4, full);
+    TEST_ASSERT_EQUAL_UINT(4, none); /* the ninth has what is left */
+}
+
+TEST(parameters_outside_their_range_are_refused_whole)
+{
+    begin_cold(3, 3);
+    drive_policy_parameters_t wrong = parameters;
+    uint16_t bad = 0;
+    wrong.boost_current_ma = 3300;
+    TEST_ASSERT_FALSE(drive_policy_apply(&policy, &wrong, &model, &bad));
+    TEST_ASSERT_EQUAL_UINT16(PARAMETER_boost_current_a, bad);
+    TEST_ASSERT_EQUAL_UINT16(3000, policy.parameters.boost_current_ma);
+    wrong = parameters;
+    wrong.unsure_margin_cc = (uint16_t)(wrong.hold_margin_cc - 1);
+    TEST_ASSERT_FALSE(drive_policy_check(&wrong, &bad));
+    TEST_ASSERT_EQUAL_UINT16(PARAMETER_unsure_margin_k, bad);
+    wrong.unsure_margin_cc = wrong.hold_margin_cc;
+    TEST_ASSERT_TRUE(drive_policy_check(&wrong, &bad));
+    wrong = parameters;
+    wrong.policy = 2;
+    TEST_ASSERT_FALSE(drive_policy_check(&wrong, &bad));
+    TEST_ASSERT_FALSE(drive_policy_init(&policy, &wrong, &model, NULL));
 }
