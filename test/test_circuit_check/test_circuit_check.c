@@ -174,6 +174,35 @@ TEST(another_output_is_found_within_two_seconds_and_a_slow_or_still_reading_is_n
     }
 }
 
+/* Its voltage is read 4 ms after its current. */
+TEST(supply_that_swings_is_found_within_two_seconds)
+{
+    static const struct {
+        double hz, share;
+        bool found;
+    } swings[] = {{0.2, 0.1, false}, {2.0, 0.15, true},   {10.0, 0.06, false}, {10.0, 0.1, true},
+                  {24.7, 0.2, true}, {24.7, 0.06, false}, {41.3, 0.1, true}};
+    for (unsigned n = 0; n < 2u * ROWS(swings); n++) {
+        const double turn = 6.283185307179586 * swings[n / 2u].hz;
+        const double share = swings[n / 2u].share;
+        uint32_t tick = 0;
+        bool found = false;
+        setUp();
+        for (; tick < 3000u && !found; tick++) {
+            const uint16_t duty = swept(n % 2u != 0 ? 190 : 60, n % 2u != 0 ? 3 : 16, tick);
+            const double at_s = 0.02 * tick;
+            const double ma = current_ma(&declared, duty, 0);
+            circuit_check_take(
+                &check, 180, 0, duty, true, (int16_t)lround(ma * (1.0 + share * sin(turn * at_s))),
+                (int16_t)(4 * lround(ma * (1.0 + share * sin(turn * (at_s + 0.004))) * 0.2 / 4.0)));
+            found = tick % CIRCUIT_CHECK_TICKS == 29u && judges(NULL);
+        }
+        row(n);
+        TEST_ASSERT_EQUAL(swings[n / 2u].found, found);
+        TEST_ASSERT_TRUE(!found || tick <= 100u);
+    }
+}
+
 TEST(a_window_says_what_its_readings_were)
 {
     for (uint8_t readings = 11; readings <= 29; readings = (uint8_t)(readings + 1u)) {

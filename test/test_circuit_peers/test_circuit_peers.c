@@ -117,6 +117,25 @@ TEST(a_sensor_that_was_wrong_from_the_first_may_be_another_one_after_a_clear)
     }
 }
 
+/* However slow: what is soldered stays what it is, and its share is no more learnt after 255
+ * windows.
+ */
+TEST(a_drift_is_found_however_slow)
+{
+    for (unsigned slow = 0; slow < 2; slow++) {
+        setUp();
+        float share = 1.0f;
+        unsigned found = rounds(255, SPRINGS, HEATS_MV, share, 1.0f);
+        TEST_ASSERT_EQUAL_HEX(0, found);
+        for (unsigned n = 0; n < (slow ? 30000u : 30u) && found == 0; n++) {
+            share -= slow ? 0.000003f : 0.003f;
+            found = rounds(1, SPRINGS, HEATS_MV, share, 1.0f);
+        }
+        TEST_ASSERT_EQUAL_HEX(1, found);
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, 0.925f, share);
+    }
+}
+
 /* From 0.25 V on with that drop: below, offsets make more than what a share may be. */
 TEST(of_too_few_volts_no_share_is_learnt)
 {

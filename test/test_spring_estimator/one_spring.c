@@ -123,16 +123,16 @@ void ticks(double current_a, double seconds)
     }
 }
 
-double heat(double most_s)
+void heat_then_hold(double most_s)
 {
-    double time_s = 0.0;
     spring_estimator_disturb(&estimator, 0);
     spring_estimator_begin_heating(&estimator, &model, 0);
-    while (time_s < most_s && !spring_estimator_has_transformed(&estimator, &model, 0)) {
+    for (double s = 0.0; s < most_s && !spring_estimator_has_transformed(&estimator, &model, 0);
+         s += TICK_S) {
         (void)tick(3.0);
-        time_s += TICK_S;
     }
-    return time_s;
+    spring_estimator_disturb(&estimator, 0);
+    spring_estimator_begin_hold(&estimator, &model, 0, true);
 }
 
 double hold_current_a(double margin_k)
@@ -153,26 +153,4 @@ void hold(double margin_k, double seconds)
     for (double s = 0.0; s < seconds; s += TICK_S) {
         (void)tick(hold_current_a(margin_k));
     }
-}
-
-float search(double from_k)
-{
-    float sd_k = spring_estimator_sd_k(BELIEF);
-    double margin_k = from_k;
-    for (double s = 0.0; s < 400.0 && spring_estimator_lost(BELIEF) == 0.0f; s += TICK_S) {
-        sd_k = spring_estimator_sd_k(BELIEF);
-        margin_k -= spring_estimator_rests(BELIEF) && !spring_estimator_seems_to_lose(BELIEF)
-                        ? 0.08 * TICK_S
-                        : 0.0;
-        (void)tick(hold_current_a(margin_k));
-    }
-    return sd_k;
-}
-
-double heat_then_hold(double most_s)
-{
-    const double took_s = heat(most_s);
-    spring_estimator_disturb(&estimator, 0);
-    spring_estimator_begin_hold(&estimator, &model, 0, true);
-    return took_s;
 }

@@ -38,17 +38,12 @@ void begin_cold(void);
 /* One tick with a current; true in a tick in which the estimator had its turn. */
 bool tick(double current_a);
 void ticks(double current_a, double seconds);
-/* 3 A until it has transformed as far as the estimator knows; returns s, or `most_s`. */
-double heat(double most_s);
-/* The same, then a hold begins. */
-double heat_then_hold(double most_s);
+/* 3 A until it has transformed as far as the estimator knows, or so long; then a hold begins. */
+void heat_then_hold(double most_s);
 /* Current that holds it where the estimator has `margin_k` above martensite start, with the dither
  * of the drive. */
 double hold_current_a(double margin_k);
 void hold(double margin_k, double seconds);
-/* Holds it nearer and nearer until phase is seen to be lost; returns the sd of the distance in the
- * turn before, K. */
-float search(double from_k);
 double resistance_ohm(void);
 double distance_k(void); /* true, to the true martensite start */
 

@@ -46,7 +46,7 @@ TEST(whatever_bit_of_a_belief_turns_over_nothing_is_known_from_its_next_turn_on)
     for (unsigned held = 0; held < 2; held++) {
         begin_cold();
         if (held != 0) {
-            (void)heat_then_hold(60.0);
+            heat_then_hold(60.0);
         } else {
             spring_estimator_begin_heating(&estimator, &model, 0);
         }
@@ -67,7 +67,7 @@ TEST(whatever_bit_of_a_belief_turns_over_nothing_is_known_from_its_next_turn_on)
 
 TEST(whatever_bit_of_what_springs_share_turns_over_that_begins_anew)
 {
-    (void)heat_then_hold(60.0);
+    heat_then_hold(60.0);
     keep_sound();
     TEST_ASSERT_TRUE(estimator.sights.count > 2);
     const size_t end = offsetof(spring_estimator_t, sights.count);
@@ -141,7 +141,7 @@ TEST(mark_is_of_every_number_that_is_believed)
     ticks(2.0, 5.0);
     expect_marks(heats, ROWS(heats));
     begin_cold();
-    (void)heat_then_hold(60.0);
+    heat_then_hold(60.0);
     expect_marks(holds, ROWS(holds));
     begin_cold();
 }
@@ -185,7 +185,7 @@ TEST(change_before_its_turn_hides_no_bit)
     static void (*const changes[])(void) = {and_is_left,      and_is_told,     and_forgets,
                                             and_forgets_loss, and_keeps_loss,  and_is_restored,
                                             and_is_prepared,  and_is_disturbed};
-    (void)heat_then_hold(60.0);
+    heat_then_hold(60.0);
     spring_estimator_begin_heating(&estimator, &model, 0);
     ticks(2.0, 1.0);
     keep_sound();

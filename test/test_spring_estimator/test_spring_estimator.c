@@ -5,8 +5,6 @@
 
 #include "../run_tests.h"
 #include "one_spring.h"
-#include "rules.h"
-#include "sights.h"
 #include "spring_estimator_internal.h"
 
 #define ACTED_ON 0.03f /* lost, by the drive: it heats it back then */
@@ -20,59 +18,6 @@ void setUp(void)
 void tearDown(void)
 {
     TEST_ASSERT_EQUAL_UINT8(0, spring_estimator_broken_seals(&estimator));
-}
-
-/* ---- power-on ---- */
-
-TEST(at_power_on_everything_is_possible)
-{
-    turn_inside(&estimator, 3);
-    power_comes_on();
-    TEST_ASSERT_EQUAL_UINT8(SPRING_ESTIMATOR_NO_TURN, spring_estimator_turn(&estimator));
-    TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_ANY, spring_estimator_possible(BELIEF));
-    const spring_bounds_t c = spring_estimator_temperature_c(&estimator, &model, 0);
-    TEST_ASSERT_TRUE(c.low <= 20.0f && c.high >= SPRING_ESTIMATOR_HOTTEST_C);
-    const spring_bounds_t austenite = spring_estimator_austenite(&estimator, &model, 0);
-    TEST_ASSERT_TRUE(austenite.low == 0.0f && austenite.high == 1.0f);
-}
-
-/* ---- a heating ---- */
-
-/* Whatever its sign and size, at the lower current of a spring that waits, through noise, in a
- * gust: it is heated until it has transformed and no farther, and its numbers are learnt. */
-TEST(transformation_is_seen_in_any_spring)
-{
-    static const struct {
-        double ratio, rise_per_k, noise_v, loss, low_a;
-    } table[] = {{1.25, 0.0, 0.004, 1.0, 3.0},    {1.40, 0.0, 0.004, 1.0, 3.0},
-                 {0.85, 0.0, 0.004, 1.0, 3.0},    {1.25, 0.0010, 0.004, 1.0, 3.0},
-                 {0.85, 0.0005, 0.004, 1.0, 3.0}, {1.25, 0.0, 0.016, 1.0, 3.0},
-                 {1.25, 0.0, 0.008, 1.0, 2.3},    {1.25, 0.0, 0.004, 1.5, 3.0},
-                 {1.25, 0.0, 0.004, 2.0, 3.0}};
-    for (size_t n = 0; n < ROWS(table); n++) {
-        begin_cold();
-        truth.ratio = table[n].ratio;
-        truth.rise_per_k = table[n].rise_per_k;
-        truth.noise_v = table[n].noise_v;
-        truth.loss_w_per_k *= table[n].loss;
-        double began_at = -1.0;
-        spring_estimator_begin_heating(&estimator, &model, 0);
-        for (double s = 0.0; s < 90.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
-             s += TICK_S) {
-            (void)tick(fmod(s, 2.0) < 1.0 ? 3.0 : table[n].low_a);
-            began_at = began_at < 0.0 && INSIDE.onset ? truth.austenite : began_at;
-        }
-        here("row %u: onset at %.2f, end at %.3f, %.1f C", (unsigned)n, began_at, truth.austenite,
-             truth.temperature_c);
-        TEST_ASSERT_TRUE(began_at > 0.0 && began_at < 0.5);
-        TEST_ASSERT_TRUE(truth.austenite > 0.97 && truth.temperature_c < 115.0);
-        spring_estimator_begin_hold(&estimator, &model, 0, true);
-        TEST_ASSERT_FALSE(spring_estimator_blind(BELIEF));
-        TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_AUSTENITE, spring_estimator_possible(BELIEF));
-        TEST_ASSERT_FLOAT_WITHIN(0.02f * (float)resistance_ohm(), (float)resistance_ohm(),
-                                 LEARNT.austenite_ohm);
-        TEST_ASSERT_FLOAT_WITHIN(0.04f, (float)(1.0 - 1.0 / table[n].ratio), LEARNT.change);
-    }
 }
 
 /* ---- bounds ---- */
@@ -127,32 +72,6 @@ TEST(spring_is_within_its_bounds)
 
 /* ---- a hold ---- */
 
-TEST(crossing_is_seen_and_makes_the_distance_sure)
-{
-    static const double loss[] = {0.85, 1.0, 1.15};
-    for (unsigned n = 0; n < 3; n++) {
-        begin_cold();
-        truth.loss_w_per_k *= loss[n];
-        (void)heat_then_hold(60.0);
-        const float before_k = search(12.0);
-        const float after_k = spring_estimator_sd_k(BELIEF);
-        here("loss x %.2f: lost %.3f of %.3f, sd %.2f -> %.2f, distance %.2f", loss[n],
-             (double)spring_estimator_lost(BELIEF), 1.0 - truth.austenite, (double)before_k,
-             (double)after_k, distance_k());
-        TEST_ASSERT_TRUE(spring_estimator_lost(BELIEF) > 0.0f);
-        TEST_ASSERT_TRUE(distance_k() > -3.0 && distance_k() < 1.0);
-        TEST_ASSERT_TRUE(after_k < before_k && after_k < 2.0f);
-        TEST_ASSERT_TRUE(holds(spring_estimator_distance_k(&estimator, &model, 0), distance_k()));
-        /* and what was learnt of the loss is right within what it says of itself */
-        const spring_learnt_t learnt = spring_estimator_learnt(&estimator, 0);
-        const double off_w_per_k = (double)learnt.loss_w_per_k - 5.8e-3 * (loss[n] - 1.0);
-        here("loss x %.2f: off by %.6f, sd %.6f", loss[n], off_w_per_k,
-             (double)learnt.loss_sd_w_per_k);
-        TEST_ASSERT_TRUE(fabs(off_w_per_k) <= 3.0 * (double)learnt.loss_sd_w_per_k);
-        TEST_ASSERT_TRUE((double)learnt.loss_sd_w_per_k < 0.12 * 5.8e-3);
-    }
-}
-
 /* A coefficient in print, whatever the change; a contact that steps or ages; noise that stays for a
  * second: nothing of that is phase, and the spring is not heated back. */
 TEST(nothing_else_is_taken_for_lost_phase)
@@ -174,7 +93,7 @@ TEST(nothing_else_is_taken_for_lost_phase)
         truth.apart_per_k = table[n].apart_per_k;
         truth.contact_ohm = table[n].contact_ohm;
         truth.slow_noise_v = table[n].slow_noise_v;
-        (void)heat_then_hold(60.0);
+        heat_then_hold(60.0);
         for (long t = 0; t < 15000; t++) {
             truth.contact_ohm += t == 5000 ? table[n].step_ohm : 0.0;
             truth.contact_ohm += table[n].age_ohm_per_s * TICK_S;
@@ -184,29 +103,6 @@ TEST(nothing_else_is_taken_for_lost_phase)
             TEST_ASSERT_TRUE(spring_estimator_lost(BELIEF) < ACTED_ON);
         }
         TEST_ASSERT_TRUE(truth.austenite > 0.97 && !spring_estimator_blind(BELIEF));
-    }
-}
-
-/* A touch in mid-hold, at once or within a second: all four temperatures rise by 8 K, and phase
- * goes, as fast as a contact steps. */
-TEST(transformation_that_moves_is_noticed)
-{
-    for (int slow = 0; slow < 2; slow++) {
-        const double margin_k = slow ? 3.0 : 5.0;
-        begin_cold();
-        (void)heat_then_hold(60.0);
-        hold(margin_k, 120.0);
-        const float before_k = spring_estimator_shift_k(BELIEF);
-        double s = 0.0;
-        for (; s < 60.0 && spring_estimator_lost(BELIEF) < ACTED_ON; s += TICK_S) {
-            truth.shift_k = slow ? fmin(8.0, 8.0 * s) : 8.0;
-            (void)tick(hold_current_a(margin_k));
-        }
-        here("after %.1f s, lost %.3f of %.3f, shift %.2f", s,
-             (double)spring_estimator_lost(BELIEF), 1.0 - truth.austenite,
-             (double)spring_estimator_shift_k(BELIEF));
-        TEST_ASSERT_TRUE(s < 20.0 && spring_estimator_shift_k(BELIEF) > before_k);
-        TEST_ASSERT_EQUAL_UINT16(0, INSIDE.unsteady);
     }
 }
 
@@ -252,5 +148,3 @@ TEST(numbers_that_no_spring_has_are_not_restored)
     TEST_ASSERT_FLOAT_WITHIN(1e-7f, 0.12f * 0.0058f, LEARNT.loss_sd_w_per_k);
     INSIDE.loss_variance = 1e-8f;
 }
-
-/* ---- readings that are none ---- */

@@ -510,25 +510,6 @@ TEST(gusts_come_and_go)
     TEST_ASSERT_DOUBLE_WITHIN(400.0, 2000.0, windy_s); /* 200 gusts: their sum +- 2 sigma */
 }
 
-TEST(the_same_seed_is_the_same_world)
-{
-    controller_inputs_t first;
-    for (int i = 0; i < 3; i++) {
-        world_parameters_default(&parameters);
-        world_draw(&parameters, i < 2 ? 5 : 6, 0.15);
-        make_world();
-        outputs.duty[4] = 100;
-        run_s(20.0);
-        if (i == 0) {
-            first = inputs;
-        } else if (i == 1) {
-            TEST_ASSERT_EQUAL_MEMORY(&first, &inputs, sizeof inputs);
-        } else {
-            TEST_ASSERT_TRUE(first.sensor[4].voltage_mv != inputs.sensor[4].voltage_mv);
-        }
-    }
-}
-
 TEST(a_drawing_stays_within_its_tolerance_and_uses_it)
 {
     double least = 1.0, most = 1.0;
