@@ -296,6 +296,7 @@ TEST(heating_slows_to_a_level_and_keeps_what_waits)
         stands(0, HEAT, table[n].permille);
         policy.spring[0].granted_ma = table[n].granted_ma;
         policy.spring[0].floor_ma = table[n].floor_ma;
+        policy.spring[0].wanted_ma = 1;
         turn_of(0);
         row(n);
         const int asks_ma = table[n].asks_w < 0.0f ? BOOST_MA : ma_of(table[n].asks_w);
@@ -365,6 +366,7 @@ TEST(way_down_ends_at_its_level)
         if (table[n].stage == HOLD) {
             TEST_ASSERT_FLOAT_WITHIN(0.01f, 24.0f, s->margin_k);
             TEST_ASSERT_EQUAL(B, of(0)->possible);
+            TEST_ASSERT_EQUAL_UINT8(0, of(0)->quiet); /* it is told that a hold begins */
         }
         if (table[n].stage == HEAT) {
             TEST_ASSERT_FLOAT_WITHIN(0.01f, 4.0f, s->rise_k_per_s);
@@ -447,6 +449,9 @@ TEST(away_is_what_is_not_within_its_band)
         TEST_ASSERT_EQUAL_UINT16(table[n].there ? 280 : 101, policy.spring[0].away.turns);
         TEST_ASSERT_EQUAL_UINT16(table[n].there ? 8960 : 8999, policy.spring[0].away.tried);
     }
+    policy.spring[0].away.turns = 340; /* and it is said */
+    turn_of(0);
+    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
 }
 
 /* 85 s after it was asked for, or 15 s after it left; four tries, one more in ten minutes, or for
@@ -866,6 +871,7 @@ TEST(targets_walk_until_two_rounds_after_the_last)
     policy_tick();
     TEST_ASSERT_EQUAL_UINT16(515, target_ma[0]);
     TEST_ASSERT_EQUAL_UINT16(515, target_ma[1]);
+    TEST_ASSERT_EQUAL_UINT16(1030, policy.sum_ma);
     parameters.policy = DRIVE_POLICY_OPEN;
     apply(&parameters);
     TEST_ASSERT_EQUAL_UINT8(21, policy.walks);

@@ -345,7 +345,7 @@ TEST(on_time_is_limited_only_where_it_is_set)
     parameters.maximum_on_s = 10;
     TEST_ASSERT_TRUE(safety_init(&safety, &parameters, 9, NULL));
     for (int pulse = 0; pulse < 5; pulse++) { /* pauses start it again */
-        ticks(4, &running, 450);
+        ticks(4, &running, 499);
         ticks(4, &off, 1);
     }
     TEST_ASSERT_TRUE(safety_allows(&safety, 4));

@@ -306,6 +306,9 @@ TEST(hottest_possible_cools_by_the_least_loss_with_its_latent_heat)
         const double c = hottest_c[n / 2u], current_a = n % 2u == 0 ? 0.0 : 1.0;
         power_comes_on();
         row(n);
+        TEST_ASSERT_EQUAL_FLOAT(SPRING_ESTIMATOR_HOTTEST_C, INSIDE.hottest_c);
+        NEAR(pow(0.29 * ((double)SPRING_ESTIMATOR_HOTTEST_C - 20.0) + 5.0, 2) + 9.0,
+             INSIDE.variance_k2);
         INSIDE.hottest_c = (float)c;
         give(current_a, 0.2);
         turn();

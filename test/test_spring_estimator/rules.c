@@ -31,6 +31,7 @@ static void begin_three(void)
     p.columns = SPRINGS;
     (void)thermal_model_init(&model, &p, NULL);
     spring_estimator_init(&estimator, &model);
+    TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_ANY, estimator.spring[SPRINGS - 1].possible);
     thermal_model_reset(&model, 20 * 128);
     spring_estimator_trust_model(&estimator, &model);
     TEST_ASSERT_EQUAL_UINT8(M, estimator.spring[SPRINGS - 1].possible);
@@ -80,6 +81,8 @@ TEST(phase_is_missing_beyond_what_steps_noise_and_coefficient_explain)
         INSIDE.blind = false;
         INSIDE.current_a = 0.79f; /* too weak to tell */
         TEST_ASSERT_FALSE(spring_estimator_lacks_phase(&INSIDE, &model, 0));
+        INSIDE.current_a = 0.8f;
+        TEST_ASSERT_EQUAL(table[n].lacks, spring_estimator_lacks_phase(&INSIDE, &model, 0));
     }
 }
 
@@ -104,6 +107,10 @@ TEST(heating_is_over_where_its_austenite_is_read_twice)
         begin_heated(table[n].temperature_c, table[n].change, table[n].ohm);
         INSIDE.ohm_before[1] = table[n].before_ohm;
         TEST_ASSERT_EQUAL(table[n].over, spring_estimator_has_transformed(&estimator, &model, 0));
+        INSIDE.current_a = 0.79f; /* too weak to tell */
+        TEST_ASSERT_EQUAL(table[n].temperature_c > 98.0f,
+                          spring_estimator_has_transformed(&estimator, &model, 0));
+        INSIDE.current_a = 3.0f;
         INSIDE.blind = true;
         TEST_ASSERT_EQUAL(table[n].temperature_c > 98.0f, /* hot enough by the model */
                           spring_estimator_has_transformed(&estimator, &model, 0));
@@ -387,7 +394,7 @@ TEST(all_that_is_compared_with_jumps_along)
 TEST(declared_change_stands_in_until_one_is_learnt)
 {
     for (int learnt = 0; learnt < 2; learnt++) {
-        begin_cold();
+        begin_three();
         INSIDE.learnt.austenite_ohm = learnt != 0 ? 0.22f : 0.0f;
         INSIDE.learnt.change = 0.1f;
         spring_seal(&estimator, 0);
@@ -395,6 +402,7 @@ TEST(declared_change_stands_in_until_one_is_learnt)
         model.parameters.resistance_austenite_uohm = 200000;
         spring_estimator_prepare(&estimator, &model, true);
         TEST_ASSERT_FLOAT_WITHIN(1e-6f, learnt != 0 ? 0.1f : 0.25f, INSIDE.learnt.change);
+        TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.25f, estimator.spring[SPRINGS - 1].learnt.change);
     }
 }
 
@@ -426,8 +434,15 @@ TEST(loss_that_was_never_seen_is_the_declared_one)
     TEST_ASSERT_FLOAT_WITHIN(1e-5f, -0.8f * 0.0058f, LEARNT.loss_w_per_k);
     TEST_ASSERT_FLOAT_WITHIN(1e-5f, 0.8944f * 0.12f * 0.0058f, LEARNT.loss_sd_w_per_k);
     TEST_ASSERT_EQUAL_FLOAT(-1e-3f, INSIDE.covariance);
+    TEST_ASSERT_EQUAL_FLOAT(LEARNT.loss_sd_w_per_k, INSIDE.learnt.loss_sd_w_per_k);
     declare(0.5);
     TEST_ASSERT_TRUE(INSIDE.covariance > -1e-3f);
+    begin_cold(); /* of a warm one that is at once what it gives off */
+    thermal_model_set_temperature(&model, 0, 60 * 128);
+    INSIDE.loss_variance *= 0.5f;
+    spring_seal(&estimator, 0);
+    declare(2.0);
+    TEST_ASSERT_INT32_WITHIN(1, 40e6f * LEARNT.loss_w_per_k, INSIDE.extra_loss_uw);
     begin_cold();
     /* and one that is known less by now than any declared one stays as it is */
     INSIDE.loss_variance = 4e-6f;
@@ -450,6 +465,8 @@ TEST(loss_beyond_what_is_ever_learnt_comes_nearer_only)
     declare(8.0);
     const float kept = LEARNT.loss_w_per_k;
     TEST_ASSERT_FLOAT_WITHIN(0.0008f, -0.0406f, kept);
+    TEST_ASSERT_FLOAT_WITHIN(1e-6f, -0.45f * 0.0464f,
+                             spring_estimator_to_keep(&estimator, 0).loss_w_per_k);
     spring_correct_loss(&estimator, belief_inside(&estimator, 0), -0.001f);
     TEST_ASSERT_EQUAL_FLOAT(kept, INSIDE.learnt.loss_w_per_k);
     spring_correct_loss(&estimator, belief_inside(&estimator, 0), 0.001f);

@@ -140,11 +140,17 @@ TEST(numbers_that_no_spring_has_are_not_restored)
     for (unsigned n = 0; n < 3; n++) {
         spring_learnt_t own = good;
         own.austenite_ohm = possible_ohm[n];
+        own.slow_noise = 0.01f;
         spring_estimator_restore(&estimator, 0, &own);
         TEST_ASSERT_EQUAL_FLOAT(possible_ohm[n], LEARNT.austenite_ohm);
         TEST_ASSERT_EQUAL_FLOAT(1e-8f, INSIDE.loss_variance);
     }
+    spring_learnt_t sure = good;
+    sure.loss_sd_w_per_k = 0.0f;
+    power_comes_on();
+    spring_estimator_restore(&estimator, 0, &sure);
+    TEST_ASSERT_EQUAL_FLOAT(0.22f, LEARNT.austenite_ohm);
     INSIDE.loss_variance = 1e-4f; /* known less than a declared one is, it is that one */
     TEST_ASSERT_FLOAT_WITHIN(1e-7f, 0.12f * 0.0058f, LEARNT.loss_sd_w_per_k);
-    INSIDE.loss_variance = 1e-8f;
+    begin_cold();
 }

@@ -231,6 +231,7 @@ TEST(what_no_phase_does_so_fast_is_a_jump)
         if (sights_inside(&estimator)->numbers != sights) {
             TEST_ASSERT_EQUAL_UINT8(SPRING_SIGHT_JUMPED, sight()->kind);
             TEST_ASSERT_EQUAL_UINT8(becomes_loose ? SPRING_DID_BLIND : 0, sight()->did);
+            TEST_ASSERT_TRUE(sight()->seen == 0 && sight()->seen_sd == 0);
             TEST_ASSERT_INT_WITHIN(20, lround(1e4 * table[n / 2u].step), sight()->read);
         }
         TEST_ASSERT_EQUAL(becomes_loose || left > 2048u, spring_is_loose(&INSIDE));
