@@ -19,11 +19,23 @@ static hil_frame_sensors_t some_sensors(void)
     return sensors;
 }
 
-static hil_frame_event_t feed(hil_frame_decoder_t *decoder, const char *line, uint8_t length)
+static hil_frame_decoder_t decoder;
+static hil_frame_sensors_t sent; /* and as a line: */
+static char line[HIL_FRAME_MAX_LINE];
+static uint8_t length;
+
+void setUp(void)
+{
+    hil_frame_decoder_init(&decoder);
+    sent = some_sensors();
+    length = hil_frame_encode_sensors(&sent, line);
+}
+
+static hil_frame_event_t feed(const char *bytes, uint8_t count)
 {
     hil_frame_event_t event = HIL_FRAME_OUTSIDE;
-    for (uint8_t i = 0; i < length; i++) {
-        event = hil_frame_decode(decoder, (uint8_t)line[i]);
+    for (uint8_t i = 0; i < count; i++) {
+        event = hil_frame_decode(&decoder, (uint8_t)bytes[i]);
     }
     return event;
 }
@@ -35,13 +47,8 @@ TEST(checksum_is_the_published_one)
 
 TEST(sensors_survive_the_line)
 {
-    char line[HIL_FRAME_MAX_LINE];
-    const hil_frame_sensors_t sent = some_sensors();
-    const uint8_t length = hil_frame_encode_sensors(&sent, line);
     TEST_ASSERT_EQUAL_UINT8(HIL_FRAME_MAX_LINE, length);
-    hil_frame_decoder_t decoder;
-    hil_frame_decoder_init(&decoder);
-    TEST_ASSERT_EQUAL(HIL_FRAME_SENSORS, feed(&decoder, line, length));
+    TEST_ASSERT_EQUAL(HIL_FRAME_SENSORS, feed(line, length));
     hil_frame_sensors_t got;
     memset(&got, 0, sizeof got);
     hil_frame_get_sensors(&decoder, &got);
@@ -51,23 +58,16 @@ TEST(sensors_survive_the_line)
 TEST(duties_survive_the_line)
 {
     for (uint8_t springs = 1; springs <= 9; springs++) {
-        hil_frame_duties_t sent;
-        memset(&sent, 0, sizeof sent);
-        sent.tick = 513;
-        sent.fan_percent = 100;
-        sent.springs = springs;
+        hil_frame_duties_t duties = {.tick = 513, .fan_percent = 100, .springs = springs};
         for (uint8_t k = 0; k < springs; k++) {
-            sent.duty[k] = (uint16_t)(800 - k);
+            duties.duty[k] = (uint16_t)(800 - k);
         }
-        char line[HIL_FRAME_MAX_LINE];
-        const uint8_t length = hil_frame_encode_duties(&sent, line);
-        hil_frame_decoder_t decoder;
-        hil_frame_decoder_init(&decoder);
-        TEST_ASSERT_EQUAL(HIL_FRAME_DUTIES, feed(&decoder, line, length));
+        length = hil_frame_encode_duties(&duties, line);
+        TEST_ASSERT_EQUAL(HIL_FRAME_DUTIES, feed(line, length));
         hil_frame_duties_t got;
         memset(&got, 0, sizeof got);
         hil_frame_get_duties(&decoder, &got);
-        TEST_ASSERT_EQUAL_MEMORY(&sent, &got, sizeof sent);
+        TEST_ASSERT_EQUAL_MEMORY(&duties, &got, sizeof duties);
     }
 }
 
@@ -76,8 +76,7 @@ TEST(frame_is_as_described)
 {
     hil_frame_duties_t duties = {
         .tick = 0x0102, .fan_percent = 0x32, .springs = 1, .duty = {0x0320}};
-    char line[HIL_FRAME_MAX_LINE];
-    const uint8_t length = hil_frame_encode_duties(&duties, line);
+    length = hil_frame_encode_duties(&duties, line);
     TEST_ASSERT_EQUAL_UINT8(17, length);
     TEST_ASSERT_EQUAL_MEMORY("~D0102320320", line, 12);
     TEST_ASSERT_EQUAL('\n', line[16]);
@@ -85,12 +84,10 @@ TEST(frame_is_as_described)
 
 TEST(no_frame_holds_a_realtime_byte)
 {
-    hil_frame_sensors_t sensors = some_sensors();
-    char line[HIL_FRAME_MAX_LINE];
     for (uint16_t tick = 0; tick < 2000; tick++) {
-        sensors.tick = tick;
-        sensors.sensor[0].current_ma = (int16_t)(tick * 31);
-        const uint8_t length = hil_frame_encode_sensors(&sensors, line);
+        sent.tick = tick;
+        sent.sensor[0].current_ma = (int16_t)(tick * 31);
+        length = hil_frame_encode_sensors(&sent, line);
         TEST_ASSERT_NULL(memchr(line, '!', length));
         TEST_ASSERT_NULL(memchr(line, '?', length));
     }
@@ -98,44 +95,34 @@ TEST(no_frame_holds_a_realtime_byte)
 
 TEST(every_flipped_bit_is_detected)
 {
-    char line[HIL_FRAME_MAX_LINE];
-    const hil_frame_sensors_t sent = some_sensors();
-    const uint8_t length = hil_frame_encode_sensors(&sent, line);
     for (uint16_t bit = 0; bit < 8u * length; bit++) {
         char broken[HIL_FRAME_MAX_LINE + 1];
         memcpy(broken, line, length);
         broken[bit / 8u] = (char)(broken[bit / 8u] ^ (1 << (bit % 8u)));
         broken[length] = '\n'; /* whatever happened, the next line end closes it */
-        hil_frame_decoder_t decoder;
-        hil_frame_decoder_init(&decoder);
+        setUp();
         for (uint8_t i = 0; i <= length; i++) {
             const hil_frame_event_t event = hil_frame_decode(&decoder, (uint8_t)broken[i]);
             TEST_ASSERT_NOT_EQUAL(HIL_FRAME_SENSORS, event);
             TEST_ASSERT_NOT_EQUAL(HIL_FRAME_DUTIES, event);
         }
         /* and the next good frame is understood */
-        TEST_ASSERT_EQUAL(HIL_FRAME_SENSORS, feed(&decoder, line, length));
+        TEST_ASSERT_EQUAL(HIL_FRAME_SENSORS, feed(line, length));
     }
 }
 
 TEST(every_cut_is_detected)
 {
-    char line[HIL_FRAME_MAX_LINE];
-    const hil_frame_sensors_t sent = some_sensors();
-    const uint8_t length = hil_frame_encode_sensors(&sent, line);
     for (uint8_t cut = 1; cut < length - 1; cut++) {
-        hil_frame_decoder_t decoder;
-        hil_frame_decoder_init(&decoder);
-        TEST_ASSERT_EQUAL(HIL_FRAME_PART, feed(&decoder, line, cut));
+        setUp();
+        TEST_ASSERT_EQUAL(HIL_FRAME_PART, feed(line, cut));
         TEST_ASSERT_EQUAL(HIL_FRAME_BAD, hil_frame_decode(&decoder, '\n'));
-        TEST_ASSERT_EQUAL(HIL_FRAME_SENSORS, feed(&decoder, line, length));
+        TEST_ASSERT_EQUAL(HIL_FRAME_SENSORS, feed(line, length));
     }
 }
 
 TEST(endless_frame_is_dropped_and_does_not_overflow)
 {
-    hil_frame_decoder_t decoder;
-    hil_frame_decoder_init(&decoder);
     hil_frame_decode(&decoder, '~');
     hil_frame_decode(&decoder, 'S');
     for (uint16_t i = 0; i < 1000; i++) {
@@ -148,22 +135,18 @@ TEST(endless_frame_is_dropped_and_does_not_overflow)
 
 TEST(console_lines_pass_by)
 {
-    hil_frame_decoder_t decoder;
-    hil_frame_decoder_init(&decoder);
-    TEST_ASSERT_EQUAL(HIL_FRAME_OUTSIDE, feed(&decoder, "on 1 ~S 1\r\n", 11));
-    TEST_ASSERT_EQUAL(HIL_FRAME_OUTSIDE, feed(&decoder, "\r\nS00\n", 6));
-    TEST_ASSERT_EQUAL(HIL_FRAME_BAD, feed(&decoder, "~X00\n", 5));
+    TEST_ASSERT_EQUAL(HIL_FRAME_OUTSIDE, feed("on 1 ~S 1\r\n", 11));
+    TEST_ASSERT_EQUAL(HIL_FRAME_OUTSIDE, feed("\r\nS00\n", 6));
+    TEST_ASSERT_EQUAL(HIL_FRAME_BAD, feed("~X00\n", 5));
 }
 
 TEST(wrong_number_of_springs_is_refused)
 {
-    char line[HIL_FRAME_MAX_LINE];
-    hil_frame_sensors_t sensors = some_sensors();
     hil_frame_duties_t duties = {.springs = 10};
-    sensors.springs = 0;
-    TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_sensors(&sensors, line));
-    sensors.springs = 10;
-    TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_sensors(&sensors, line));
+    sent.springs = 0;
+    TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_sensors(&sent, line));
+    sent.springs = 10;
+    TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_sensors(&sent, line));
     TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_duties(&duties, line));
     duties.springs = 0;
     TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_duties(&duties, line));
