@@ -277,6 +277,33 @@ TEST(supply_that_steps_is_learnt_anew)
     }
 }
 
+/* A bit of RAM turns over in any number: within some heatings all is as it was. */
+TEST(whatever_turns_over_is_learnt_again)
+{
+    const true_t is = {5000, 390};
+    float *const numbers[] = {&source.supply_mv,   &source.drop_mv,   &source.step_mv,
+                              &source.unsure_mv,   &source.less_mv,   &source.more_mv,
+                              &source.more_drop_v, &source.duty,      &source.voltage_mv,
+                              &source.before,      &source.mean_duty, &source.mean_mv,
+                              &source.duty_square, &source.duty_mv};
+    const float wrong[] = {NAN, INFINITY, -INFINITY, -1e30f, 1e30f, 0.0f};
+    for (unsigned n = 0; n < ROWS(numbers); n++) {
+        for (unsigned k = 0; k < ROWS(wrong); k++) {
+            setUp();
+            rounds(8, 9, is, 230.0f);
+            rounds(8, 9, is, 110.0f);
+            *numbers[n] = wrong[k];
+            for (unsigned heating = 0; heating < 12; heating++) {
+                rounds(8, 9, is, 230.0f);
+                rounds(8, 9, is, 110.0f);
+            }
+            TEST_ASSERT_FLOAT_WITHIN(30.0f, 390.0f, source.drop_mv);
+            TEST_ASSERT_FLOAT_WITHIN(25.0f, behind_mv(is, 110.0f), expected_mv(110.0f));
+            TEST_ASSERT_TRUE(source.unsure_mv < 60.0f && source.less_mv < 60.0f);
+        }
+    }
+}
+
 /* It forgets levels within rounds, and how much both moved only by what moves. */
 TEST(a_hold_forgets_a_supply_and_keeps_a_drop)
 {
