@@ -256,30 +256,6 @@ TEST(current_in_an_output_that_is_off_stops_the_board)
     TEST_ASSERT_TRUE(all_off());
 }
 
-/* One or two readings of current, a glitch each four seconds, take a pulse or two and switch
- * nothing off. */
-TEST(a_glitch_of_current_takes_a_pulse_and_no_more)
-{
-    controller_set_target(&controller, 0, 1000);
-    run(100);
-    for (unsigned length = 1; length < SAFETY_STUCK_TICKS; length++) {
-        for (int n = 0; n < 10; n++) {
-            inputs.sensor[5].current_ma = 400;
-            for (unsigned tick = 0; tick < length; tick++) {
-                controller_tick(&controller, &inputs, &outputs);
-                TEST_ASSERT_FALSE(outputs.supply);
-            }
-            inputs.sensor[5].current_ma = 0;
-            run(1);
-            TEST_ASSERT_TRUE(outputs.supply);
-            run(2u * SAFETY_FORGET_TICKS);
-        }
-    }
-    TEST_ASSERT_NOT_EQUAL(0, outputs.duty[0]);
-    TEST_ASSERT_FALSE(controller_supply_is_off(&controller));
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
-}
-
 TEST(hot_model_trips)
 {
     controller_set_target(&controller, 4, 1000);

@@ -930,4 +930,11 @@ TEST(what_a_heating_keeps_comes_before_other_boosts)
         TEST_ASSERT_EQUAL(table[n].permille != 0 && table[n].stage == HEAT,
                           policy.queue.count == 2);
     }
+    begin(1, 2); /* and what it keeps is a part of what it gets */
+    stands(0, HEAT, 1000);
+    policy.spring[0].wanted_ma = 1500;
+    policy.spring[0].floor_ma = 600;
+    supply_limit_ma = 15000;
+    policy_tick();
+    TEST_ASSERT_EQUAL_UINT16(1500, target_ma[0]);
 }
