@@ -184,17 +184,6 @@ TEST(mean_current_is_the_target)
     }
 }
 
-TEST(freewheel_drop_is_fed_forward)
-{
-    parameters.freewheel_mv = 350;
-    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
-    load.freewheel_mv = 350;
-    mean_ua(1500, 30);
-    TEST_ASSERT_INT32_WITHIN(5000, 1500000, mean_ua(1500, 50));
-    TEST_ASSERT_INT32_WITHIN(current_control_reference_ma(&control, 0), 0,
-                             control.channel[0].trim_q24);
-}
-
 TEST(reference_rises_by_the_slew_and_falls_at_once)
 {
     parameters.slew_ma_per_tick = 100;

@@ -402,24 +402,6 @@ TEST(whatever_bit_turns_over_it_is_taken_to_be_hot)
     TEST_ASSERT_EQUAL_UINT8(0, temperature_ceiling_broken_seals(&ceiling));
 }
 
-TEST(begin_forgets_all_that_was)
-{
-    run(0.6f, 600000u, 60.0f);
-    for (uint8_t k = 0; k < 9; k++) {
-        ceiling.loss_share[k] = ceiling.capacity_share[k] = 100;
-    }
-    temperature_ceiling_begin(&ceiling, 25 * 128);
-    TEST_ASSERT_FALSE(ceiling.delivered);
-    TEST_ASSERT_EQUAL_INT16(25 * 128, ceiling.ambient_c7);
-    for (uint8_t k = 0; k < THERMAL_MODEL_MAX_SPRINGS; k++) {
-        TEST_ASSERT_EQUAL_INT32(25 * 128 * 65536, ceiling.temperature_c23[k]);
-        TEST_ASSERT_EQUAL_UINT16(0, ceiling.austenite[k]);
-        TEST_ASSERT_EQUAL_UINT16(WHOLE, ceiling.loss_share[k]);
-        TEST_ASSERT_EQUAL_UINT16(WHOLE, ceiling.capacity_share[k]);
-        TEST_ASSERT_EQUAL_UINT16(TEMPERATURE_CEILING_NEVER, ceiling.rest_turns[k]);
-    }
-}
-
 /* Warm is what power was given to and is still so far above the warmest air that was told. */
 TEST(warm_is_what_was_heated_and_has_not_cooled)
 {
