@@ -26,6 +26,7 @@ static uint8_t length;
 
 void setUp(void)
 {
+    memset(&decoder, 0xA5, sizeof decoder); /* what was in memory must not matter */
     hil_frame_decoder_init(&decoder);
     sent = some_sensors();
     length = hil_frame_encode_sensors(&sent, line);

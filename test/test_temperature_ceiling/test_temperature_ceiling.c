@@ -439,8 +439,10 @@ TEST(a_hotter_model_raises_it_and_a_colder_one_does_not)
         temperature_ceiling_raise(&ceiling, &model);
         TEST_ASSERT_EQUAL_UINT16(5000, ceiling.austenite[k]);
         thermal_model_set_temperature(&model, k, 30 * 128);
+        thermal_model_set_ambient(&model, 35 * 128); /* once heat was given, no air of it */
         temperature_ceiling_raise(&ceiling, &model);
         TEST_ASSERT_FLOAT_WITHIN(0.01f, 110.0f, temperature_ceiling_c(&ceiling, k));
+        TEST_ASSERT_EQUAL_INT16(20 * 128, ceiling.ambient_c7);
     }
 }
 
