@@ -6,6 +6,7 @@ import json
 import os
 from pathlib import Path
 
+import ninespring as ns
 import numpy as np
 import pytest
 from command import ended
@@ -180,14 +181,18 @@ def test_a_spring_whose_thermometer_is_late_is_not_taken_for_one_of_twice_the_ma
         time_s = np.arange(600.0)
         columns["t4_c"] = np.interp(time_s - 15.0, time_s, columns["t4_c"])
 
-    run_ = read_log(make_log(effects={"latent_heat": {"latent_heat_j": 8.0}}, change=late))
-    model = diagnosis.diagnose(Array(), [run_]).model
+    log = make_log(effects={"latent_heat": {"latent_heat_j": 8.0}}, change=late)
+    model = ns.fit(log, effects=["latent_heat", "spring_mismatch"])
     assert model.parameters["heat_capacity_scale[4]"] > 1.5
     made = settings_of(model)
     assert not [name for name in made.written if "scale" in name]
     assert "of spring 4 are unexplained" in made.kept["heat_capacity_scale_4"]
     # and what the chip has of the others is that of a spring like them, not of the mean with it
     assert float(made.written["heat_capacity_j_per_k"]) == pytest.approx(0.3, rel=0.05)
+    # who did not ask for it is told where something is left, and by no name
+    found = diagnosis.diagnose(Array(), [read_log(log)])
+    assert found.model.effects == ["latent_heat"]
+    assert any("rms of what spring 4 showed is explained by nothing" in warning for warning in found.result["warnings"])
 
 
 def test_a_spring_that_differs_is_written(make_log) -> None:

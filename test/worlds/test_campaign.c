@@ -126,7 +126,8 @@ TEST(after_a_restart_it_must_be_reached_again)
 /* As if the controller had seen it lose phase. */
 static void see_loss(int spring)
 {
-    spring_sights_add(&controller.estimator.sights, (uint8_t)spring)->kind = SPRING_SIGHT_LOST;
+    spring_sights_t *sights = (spring_sights_t *)controller_sights(&controller);
+    spring_sights_add(sights, (uint8_t)spring)->kind = SPRING_SIGHT_LOST;
     run_s(spring, 0, 0.1);
 }
 
