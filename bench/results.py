@@ -85,7 +85,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "diagnose",
         "Undeclared effects",
-        f"{PYTHON} bench/diagnose/run.py --seeds 1 --first 300680 --processes 1 --cases build/results/diagnose.json",
+        f"{PYTHON} bench/diagnose/run.py --seeds 1 --first 300700 --processes 1 --cases build/results/diagnose.json",
         markdown=True,
     ),
     Section(
