@@ -64,23 +64,20 @@ int belief_fault(const controller_t *controller, int spring)
     return (int)(own != SAFETY_FAULT_NONE ? own : controller_board_fault(controller));
 }
 
-/* As lib/learnt_store does, at once and without an EEPROM. */
-int belief_losses_seen(const controller_t *controller, int k, uint32_t from)
+int belief_next_loss(const controller_t *controller, uint32_t *from)
 {
     const spring_sights_t *sights = controller_sights(controller);
-    int seen = 0;
-    for (int i = 0; i < sights->count; i++) {
-        const spring_sight_t *sight = &sights->sight[i];
-        seen += sight->number >= from && sight->spring == k && sight->kind == SPRING_SIGHT_LOST;
+    const spring_sight_t *sight;
+    while ((sight = spring_sights_from(sights, SPRING_SIGHTS_ANY, *from)) != NULL) {
+        *from = sight->number + 1u;
+        if (sight->kind == SPRING_SIGHT_LOST) {
+            return sight->spring;
+        }
     }
-    return seen;
+    return -1;
 }
 
-uint32_t belief_next_sight(const controller_t *controller)
-{
-    return controller_sights(controller)->numbers;
-}
-
+/* As lib/learnt_store does, at once and without an EEPROM. */
 void belief_keep(const controller_t *controller, belief_memory_t *memory)
 {
     for (uint8_t k = 0; k < controller_springs(controller); k++) {

@@ -33,9 +33,9 @@ unsigned belief_said(const controller_t *controller, int spring);
 /* The fault of a spring, else of the board; SAFETY_FAULT_NONE (0): none. */
 int belief_fault(const controller_t *controller, int spring);
 
-/* Sights of lost phase of a spring whose number is `from` or later; the next sight's number. */
-int belief_losses_seen(const controller_t *controller, int spring, uint32_t from);
-uint32_t belief_next_sight(const controller_t *controller);
+/* The spring of the next sight of lost phase, of those whose number is *from or later; -1: none.
+ * *from is then the number of what comes after. */
+int belief_next_loss(const controller_t *controller, uint32_t *from);
 
 /* What is kept over power-off. */
 typedef struct {

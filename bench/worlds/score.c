@@ -134,14 +134,13 @@ static void score_bounds(score_spring_t *spring, const world_t *world, int k,
 
 static void score_sights(score_t *score, const world_t *world, const controller_t *controller)
 {
-    for (int k = 0; k < score->springs; k++) {
-        int seen = belief_losses_seen(controller, k, score->next_sight);
-        bool whole = world_austenite(world, k) > SCORE_WHOLE &&
-                     world_mean_c(world, k) > world_martensite_start_c(world, k) + SCORE_FAR_K;
-        score->spring[k].losses_seen += seen;
-        score->spring[k].false_losses += whole ? seen : 0;
+    int k;
+    while ((k = belief_next_loss(controller, &score->next_sight)) >= 0) {
+        score->spring[k].losses_seen++;
+        score->spring[k].false_losses +=
+            world_austenite(world, k) > SCORE_WHOLE &&
+            world_mean_c(world, k) > world_martensite_start_c(world, k) + SCORE_FAR_K;
     }
-    score->next_sight = belief_next_sight(controller);
 }
 
 void score_tick(score_t *score, const world_t *world, const controller_t *controller)

@@ -241,7 +241,7 @@ def test_what_has_no_name_is_not_looked_for_where_only_names_count(
     problem: Any = SimpleNamespace(unnamed=None, heat=None, leave_out=lambda what: None)
     first: Any = SimpleNamespace(progress=lambda text: None)
     final: Any = "final"
-    found = diagnosis._where_something_is_left(problem, first, final, {}, [], named)
+    found = diagnosis._where_something_is_left(problem, first, (final, {}, []), named)
     assert found == ("again", ("lasting", {}, []), [])
     assert looked == ([] if named else ["beside"])
 

@@ -441,10 +441,10 @@ def _searched(
     problem.learn_power(final.spec, final.values)
     hidden: list[unnamed.Hidden] = []
     if not swapped and unexplained(problem, final):
-        found, (final, without, contenders) = _springs_apart(problem, found, final, without, contenders)
+        found, (final, without, contenders) = _springs_apart(problem, found, (final, without, contenders))
     if not swapped and unexplained(problem, final):
         found, (final, without, contenders), hidden = _where_something_is_left(
-            problem, found, final, without, contenders, alike
+            problem, found, (final, without, contenders), alike
         )
     if alike and not unexplained(problem, final):
         # what is of one day may show the same, or the little that is left
@@ -652,18 +652,14 @@ def identifiability_of(fit: Fit) -> results.Identifiability:
 
 
 def _springs_apart(
-    problem: Problem,
-    first: search.Search,
-    final: Fit,
-    without: dict[str, Fit],
-    contenders: list[tuple[str, Fit]],
+    problem: Problem, first: search.Search, before: unnamed.Found
 ) -> tuple[search.Search, unnamed.Found]:
     """Search again beside springs of which each is its own, as far apart as they are found, instead of one that is; as it was where
     that is not likelier.
 
     Laws of all springs come first: they stay as long as springs would have to lie further apart without.
     """
-    plain = first, (final, without, contenders)
+    plain, final = (first, before), before[0]
     scene = scene_of(problem)
     each = effects.of_springs(scene)
     if each is None or each.effect in first.base.spec.effects:
@@ -688,16 +684,12 @@ def _springs_apart(
 
 
 def _where_something_is_left(
-    problem: Problem,
-    first: search.Search,
-    final: Fit,
-    without: dict[str, Fit],
-    contenders: list[tuple[str, Fit]],
-    named: bool,
+    problem: Problem, first: search.Search, before: unnamed.Found, named: bool
 ) -> unnamed.Beside:
     """Search again, beside causes without a name (unless only what is named counts) and with what is left taken for noise that
     lasts: the likeliest of all."""
-    plain: unnamed.Beside = (first, (final, without, contenders), [])
+    plain: unnamed.Beside = (first, before, [])
+    final = before[0]
     beside = (None if named else unnamed.search_beside(problem, first, final)) or plain
     if not all(one.possible for one in beside[2]):
         problem.leave_out(None)

@@ -41,7 +41,11 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
 
 def _says(numbers: Numbers, variant: str) -> str:
     if variant == EACH:
-        losses = [f"{percent(*one)} ({name[11:-1]})" for name, one in numbers.items() if name.startswith("loss_scale")]
+        losses = [
+            f"{percent(*one)} ({name.partition('[')[2][:-1]})"
+            for name, one in numbers.items()
+            if name.startswith("loss_scale")
+        ]
         return f"Each spring loses its own: {', '.join(losses)}."
     k = variant.removeprefix("spring ")
     loss, mass = numbers[f"loss_scale[{k}]"], numbers[f"heat_capacity_scale[{k}]"]
