@@ -224,5 +224,5 @@ def test_a_page_that_is_not_its_own_is_refused(bench: Make, tmp_path: Path) -> N
     with pytest.raises(InputError, match="no conversation that bringup has begun"):
         converse(made.board, tmp_path / "other.html", None)
     with pytest.raises(InputError, match="there is no step 'wires': board, sensors"):
-        converse(made.board, tmp_path / "new.html", None, last="wires")
+        converse(made.board, tmp_path / "new.html", None, again="wires")
     assert (tmp_path / "thesis.html").read_text() == "mine"

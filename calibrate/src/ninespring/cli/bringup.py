@@ -22,9 +22,8 @@ Examples:
 @PORT
 @output("page to write; beside it a .json, from which the next conversation goes on", default=Path("bringup.html"))
 @click.option("--again", metavar="STEP", help="from this step on, though it was right before")
-@click.option("--to", "last", metavar="STEP", default="springs", help="the last step")
 @click.option("--yes", is_flag=True, help="ask nothing: for scripts; what only a hand or an eye can tell is left out")
-def bringup(port: str, output: Path, again: str | None, last: str, yes: bool) -> None:
+def bringup(port: str, output: Path, again: str | None, yes: bool) -> None:
     """Bring up a new board in a conversation: what to do, what is measured, what is wrong and where, in the order of docs/building.md.
 
     Steps: board, sensors, supply, channels (on resistors of 0.22 ohm), air, spring, springs. A step that was right before is left out. Ends
@@ -37,15 +36,11 @@ def bringup(port: str, output: Path, again: str | None, last: str, yes: bool) ->
     def hands(question: str) -> bool:
         return click.confirm(f"{question}?", default=True)
 
+    def say(line: str) -> None:
+        out.print(line, soft_wrap=True)
+
     with Board(port) as board:
-        done = converse(
-            board,
-            output,
-            None if yes else hands,
-            lambda line: out.print(line, soft_wrap=True),
-            again,
-            last,
-        )
+        done = converse(board, output, None if yes else hands, say, again)
     for name, step in done.items():
         if not step.passed:
             raise WorkError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,17 +87,26 @@ class Driven:
         own = [float(getattr(one, name)[spring - 1]) for one in (self.low if low else self.settled)]
         return float(np.mean(own)) if own else 0.0
 
-    def faults_of(self, spring: int, numbers: tuple[int, ...]) -> bool:
-        """Return whether that spring, or any by fault 11, has one of these faults."""
-        return any(
-            re.match(rf"spring (?:{spring}|\d+(?=: fault 11)): fault (?:{'|'.join(map(str, numbers))})\b", one)
-            for one in self.faults
-        )
-
     def ohm(self, spring: int) -> float:
         """Return its resistance; NaN where nothing flows."""
         current = self.mean("current_a", spring)
         return self.mean("voltage_v", spring) / current if current > NOTHING_A else float("nan")
+
+    def others(self, spring: int) -> set[int]:
+        """Return the other springs that had a current."""
+        flowing = np.flatnonzero(self.current_a.max(axis=0) > NOTHING_A) + 1
+        return ({int(k) for k in flowing} | springs_with(self.faults, 11)) - {spring}
+
+    def swapped_with(self, spring: int) -> int:
+        """Return the channel whose sensor shows that one's current, 0 where none does in its place."""
+        instead = self.current_a[:, spring - 1].max() < NOTHING_A
+        return min(self.others(spring), default=0) if instead else 0
+
+
+def springs_with(faults: Iterable[str], *numbers: int) -> set[int]:
+    """Return the springs with one of these faults (left out: any), of the board's words."""
+    told = (re.match(r"spring (\d+): fault (\d+)\b", one) for one in faults)
+    return {int(one[1]) for one in told if one and (not numbers or int(one[2]) in numbers)}
 
 
 def jumpers(spring: int) -> str:
@@ -170,38 +179,33 @@ def drive(board: Board, spring: int, low: bool = True) -> Driven:
     return Driven(np.array([one.current_a for one in seen + second]), settled(second), settled(first), faults)
 
 
-def judge_channel(spring: int, got: Driven) -> list[str]:
-    """Say what is wrong with a channel that was driven by itself, on a resistor of DUMMY_OHM."""
-    highest, lowest = got.current_a.max(axis=0), got.current_a.min(axis=0)
-    own = highest[spring - 1]
-    stuck = {int(one) for fault in got.faults for one in re.findall(r"^spring (\d+): fault 11\b", fault)}
-    others = {k for k in range(1, len(highest) + 1) if highest[k - 1] > NOTHING_A} | stuck
-    others.discard(spring)
-    if others and own < NOTHING_A:
-        return [swap(spring, min(others))]
-    if others:
-        return [f"channels {spring} and {min(others)} are connected: {spring} is driven, and both sensors show current"]
-    if lowest[spring - 1] < -NOTHING_A or (own < NOTHING_A and any("fault 15" in one for one in got.faults)):
-        return [
-            f"sensor {spring} is reversed: it shows {lowest[spring - 1]:.3f} A. IN+ belongs at the inductor, IN- at the spring"
-        ]
-    if own < NOTHING_A:
+def judge_channel(spring: int, got: Driven) -> str:
+    """Say what is wrong with a channel that was driven by itself, on a resistor of DUMMY_OHM; '': nothing is."""
+    own = got.current_a[:, spring - 1]
+    if other := got.swapped_with(spring):
+        return swap(spring, other)
+    if others := got.others(spring):
+        return f"channels {spring} and {min(others)} are connected: {spring} is driven, and both sensors show current"
+    if own.min() < -NOTHING_A or (own.max() < NOTHING_A and springs_with(got.faults, 15)):
+        return (
+            f"sensor {spring} is reversed: it shows {own.min():.3f} A. IN+ belongs at the inductor, IN- at the spring"
+        )
+    if own.max() < NOTHING_A:
         volt = max((float(one.voltage_v[spring - 1]) for one in got.settled), default=0.0)
         what = f"the gate's wire (D{PINS[spring - 1]}), its driver, the channel's fuse or the resistor"
-        return [f"no current in channel {spring} ({volt:.3f} V though it is driven): {what} is open"]
+        return f"no current in channel {spring} ({volt:.3f} V though it is driven): {what} is open"
     ohm = got.ohm(spring)
     share = ohm / DUMMY_OHM
+    reads = f"channel {spring} reads {ohm:.3f} ohm"
     for factor, shunt in ((2.0, "R050"), (10.0, "R010"), (0.5, "R200")):
         if abs(share / factor - 1.0) < DUMMY_TOLERANCE:
-            return [
-                f"channel {spring} reads {ohm:.3f} ohm, {factor:g} times {DUMMY_OHM:g}: its shunt says {shunt}, not R100 "
-                "(or another resistor is in)"
-            ]
+            return (
+                f"{reads}, {factor:g} times {DUMMY_OHM:g}: its shunt says {shunt}, not R100 (or another resistor is in)"
+            )
     if not abs(share - 1.0) < DUMMY_TOLERANCE:
-        return [
-            f"channel {spring} reads {ohm:.3f} ohm, not {DUMMY_OHM:g} within {100 * DUMMY_TOLERANCE:.0f} %: leads, crimps or another resistor"
-        ]
-    return []
+        within = f"{DUMMY_OHM:g} within {100 * DUMMY_TOLERANCE:.0f} %"
+        return f"{reads}, not {within}: leads, crimps or another resistor"
+    return ""
 
 
 def swap(spring: int, other: int) -> str:
@@ -218,9 +222,7 @@ def which_swap(board: Board, spring: int, other: int, hands: Hands) -> str:
     if not hands(f"Channels {spring} and {other} are swapped. Take resistor {spring} out, to tell which way"):
         return swap(spring, other)
     got = drive(board, spring, low=False)
-    stays = got.current_a[:, other - 1].max() > NOTHING_A or any(
-        one.startswith(f"spring {other}: fault 11") for one in got.faults
-    )
+    stays = other in got.others(spring)
     make_ready(board)
     hands(f"Put resistor {spring} back")
     if stays:
@@ -259,20 +261,19 @@ def step_sensors(board: Board, step: Step, hands: Hands | None) -> None:
     clear(board)
     rows(board, 0.3)
     faults = board.ask("faults")
-    bad = {int(k): int(number) for one in faults for k, number in re.findall(r"^spring (\d+): fault (\d+)", one)}
+    bad, silent = springs_with(faults), springs_with(faults, 5)
     step.tell("sensors that answer", f"{springs - len(bad)}", f"{springs}")
     if any("fault 6 " in one for one in faults):
         step.found.append(
             "the bus hangs: SDA (D20) or SCL (D21) has no pull-up (4.7 k from each to 5 V), is held low, or the two are exchanged"
         )
         return
-    silent = [k for k, number in bad.items() if number == 5]
     if len(silent) == springs:
         step.found.append("no sensor answers: their 5 V, their ground, or SDA (D20) and SCL (D21) are not connected")
         return
     for k in range(1, springs + 1):
         step.tell(f"sensor {k}", "silent" if k in bad else "answers", jumpers(k))
-    step.found += [f"sensor {k} does not answer at {jumpers(k)}: its jumpers, or its wires" for k in silent]
+    step.found += [f"sensor {k} does not answer at {jumpers(k)}: its jumpers, or its wires" for k in sorted(silent)]
     step.found += [one for one in faults if one.startswith("spring") and "fault 5 " not in one]
     if step.found:
         return
@@ -331,13 +332,11 @@ def step_channels(board: Board, step: Step, hands: Hands | None) -> None:
     settings = board.settings()
     make_ready(board)
     rest = np.array([one.current_a for one in rows(board, 0.2)])
-    stuck = {int(k) for one in board.ask("faults") for k in re.findall(r"^spring (\d+): fault 11\b", one)}
-    stuck |= {k for k in range(1, springs + 1) if rest[:, k - 1].max() > NOTHING_A}
-    if stuck:
-        step.found += [
+    for k in sorted(Driven(rest, [], [], board.ask("faults")).others(0)):
+        step.found.append(
             f"current flows in channel {k} with everything off ({rest[:, k - 1].max():.2f} A): its switch is welded, or its gate is held high"
-            for k in sorted(stuck)
-        ]
+        )
+    if step.found:
         return
     driven = [(k, drive(board, k)) for k in range(1, springs + 1)]
     for k, got in driven:
@@ -346,20 +345,18 @@ def step_channels(board: Board, step: Step, hands: Hands | None) -> None:
         text = f"{own[0]:.3f} A, {own[1]:.3f} V, {got.ohm(k):.3f} ohm, duty {own[2]:.3f}, noise {noise:.0f} mA"
         text = text if own[0] > NOTHING_A else "no current"
         step.tell(f"channel {k}", text, f"{TEST_A:g} A, {TEST_A * DUMMY_OHM:.3f} V, {DUMMY_OHM:g} ohm")
-    if all(got.current_a.max() < NOTHING_A and not got.faults_of(k, (11, 15)) for k, got in driven):
+    if all(got.current_a.max() < NOTHING_A and not springs_with(got.faults, 11, 15) for _, got in driven):
         step.found.append(
             "no channel has current: the supply is off, its fuse is open, or the relay does not hold (D12 to the pump; docs/hardware.md)"
         )
         return
-    pairs: set[frozenset[int]] = set()
+    told: set[int] = set()
     for k, got in driven:
-        for one in judge_channel(k, got):
-            pair = re.match(r"channels (\d+) and (\d+) are swapped", one)
-            if pair and frozenset({k, int(pair[2])}) in pairs:
-                continue  # told from the other one's side
-            if pair:
-                pairs.add(frozenset({k, int(pair[2])}))
-            step.found.append(which_swap(board, k, int(pair[2]), hands) if pair and hands else one)
+        if k in told:  # from the other one's side
+            continue
+        told.add(other := got.swapped_with(k))
+        if wrong := which_swap(board, k, other, hands) if other and hands else judge_channel(k, got):
+            step.found.append(wrong)
     alike = {one.partition(" ohm, ")[2] for one in step.found}
     if len(step.found) == springs and len(alike) == 1 and alike != {""}:
         ohm = float(np.median([got.ohm(k) for k, got in driven]))
@@ -423,9 +420,8 @@ def judge_spring(spring: int, got: Driven, declared_ohm: float) -> list[str]:
     ohm = got.ohm(spring)
     low, high = (declared_ohm * share for share in COLD_SHARE)
     if not low <= ohm <= high:
-        return [
-            f"spring {spring} has {ohm:.3f} ohm cold, outside {low:.3f} to {high:.3f}: a crimp, or another wire: then set resistance_martensite_ohm"
-        ]
+        outside = f"outside {low:.3f} to {high:.3f}: a crimp, or another wire: then set resistance_martensite_ohm"
+        return [f"spring {spring} has {ohm:.3f} ohm cold, {outside}"]
     return [f"spring {spring}: {one}" for one in got.faults]
 
 
@@ -605,20 +601,18 @@ def converse(
     hands: Hands | None,
     say: Callable[[str], None] = print,
     again: str | None = None,
-    last: str = "springs",
 ) -> dict[str, Step]:
-    """Go through the steps up to `last` that were not right before; stop at the first in which something is wrong, or where `hands` says no.
+    """Go through the steps that were not right before; stop at the first in which something is wrong, or where `hands` says no.
 
     `again`: from that step on, though it was right. Without `hands` nobody is asked anything. Returns what is known now.
     """
     names = list(STEPS)
-    for one in (again, last):
-        if one is not None and one not in names:
-            raise InputError(f"there is no step '{one}': {', '.join(names)}")
+    if again is not None and again not in names:
+        raise InputError(f"there is no step '{again}': {', '.join(names)}")
     done = load(output)
     if again is not None:
         done = {name: step for name, step in done.items() if names.index(name) < names.index(again)}
-    for name in names[: names.index(last) + 1]:
+    for name in names:
         if name in done and done[name].passed:
             continue
         say(f"\n{STEPS[name].title}. {STEPS[name].what}")
