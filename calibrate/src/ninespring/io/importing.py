@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
+from msgspec import Meta
 
 from ..errors import InputError
 from .logs import COLUMN, LIMITS, MAX_SPRINGS, log_text, number_in, read_bytes, read_table, read_text
-from .toml_file import At, TomlFile
+from .toml_file import Keys, TomlFile, whole
+from .toml_file import number as a_number
 
 UNITS: dict[str, tuple[float, float]] = {
     "": (1.0, 0.0),
@@ -34,6 +38,7 @@ UNITS: dict[str, tuple[float, float]] = {
 """Factor and offset from a unit to the log's own."""
 
 FINITE = 1e300
+MOST_PIXELS = 100_000
 COLDEST_ROOM_K = LIMITS["ambient_c"][0] + 273.15
 """Springs that are never colder than this number are in kelvin: even the coldest room is above it, in kelvin."""
 
@@ -41,76 +46,68 @@ BUILT_IN = {path.stem: path for path in Path(__file__).with_name("mappings").glo
 """Mappings that come with the tool: `--map tclab`."""
 
 
-@dataclass
-class _Rule:
-    """Where one of the log's columns comes from: names to look for, value = factor * number + offset, or ISO times."""
+_CHARACTER = Annotated[str, Meta(min_length=1, max_length=1, description="one character in quotes")]
+_NAMES = Annotated[list[str], Meta(min_length=1, description="the source's name for it, or a list of names")]
+_RULE = Keys({"unit": str} | dict.fromkeys(("scale", "offset"), a_number(-FINITE, FINITE)), {"column": _NAMES})
+_MAPPING = Keys(
+    {
+        "columns": Keys(each=_RULE),
+        "file": Keys({"separator": _CHARACTER, "decimal": _CHARACTER, "skip_lines": whole(0, 10**9)}),
+        "constants": Keys(each=a_number(-FINITE, FINITE)),
+    }
+)
+_SIZES, _PLACES = a_number(1, MOST_PIXELS), a_number(0, MOST_PIXELS)
+_GRID = Keys(
+    {"step_x": _SIZES, "step_y": _SIZES},
+    dict.fromkeys(("rows", "cols"), whole(1, MAX_SPRINGS))
+    | dict.fromkeys(("width", "height"), _SIZES)
+    | dict.fromkeys(("left", "top"), _PLACES),
+)
+_REGION = Keys(
+    must=dict.fromkeys(("left", "top"), whole(0, MOST_PIXELS))
+    | dict.fromkeys(("width", "height"), whole(1, MOST_PIXELS))
+    | {"spring": whole(1, MAX_SPRINGS)}
+)
 
-    sources: list[str]
-    factor: float
-    offset: float
-    iso: bool
 
-
-@dataclass
-class _Mapping:
-    """A mapping, checked."""
-
-    columns: dict[str, _Rule] = field(default_factory=dict)
-    constants: dict[str, float] = field(default_factory=dict)
-    separator: str = ""
-    """As is the decimal sign: told by the header where it is empty."""
-    decimal: str = ""
-    skip_lines: int = 0
-
-
-def _read_mapping(mapping: str | Path) -> _Mapping:
+def _read_mapping(mapping: str | Path) -> dict[str, Any]:
     """Read a mapping file, or a built-in mapping; refused with file, line and column where it is wrong."""
-    file, out = TomlFile(BUILT_IN.get(str(mapping), mapping)), _Mapping()
-    file.table((), ("columns", "file", "constants"))
-    given = file.table(("file",), ("separator", "decimal", "skip_lines"))
-    for key in ("separator", "decimal"):
-        if key in given and len(file.text_at(("file", key))) != 1:
-            raise file.refuse(f"{key} must be one character in quotes", ("file", key))
-    out.separator, out.decimal = given.get("separator", ""), given.get("decimal", "")
-    if out.decimal and out.separator == out.decimal:
-        raise file.refuse("separator and decimal cannot be the same", ("file", "separator"))
-    if "skip_lines" in given:
-        out.skip_lines = file.whole(("file", "skip_lines"), 0, 10**9)
+    file = TomlFile(BUILT_IN.get(str(mapping), mapping))
+    if isinstance(columns := file.data.get("columns"), dict):
+        for name, rule in columns.items():
+            columns[name] = rule = rule if isinstance(rule, dict) else {"column": rule}
+            if isinstance(rule.get("column"), str):
+                rule["column"] = [rule["column"]]
+    given = {"columns": {}, "constants": {}, "file": {}} | file.read(_MAPPING)
     for kind in ("columns", "constants"):
-        for name in file.table((kind,), file.get((kind,)) or ()):
+        for name in given[kind]:
             if not COLUMN.match(name):
                 said = f"'{name}' is not a log's column (time_s, i1_a, v1_v, u1, t1_c, fan, ambient_c)"
                 raise file.refuse(said, (kind, name), True)
-            if kind == "columns":
-                out.columns[name] = _read_rule(file, name)
-            else:
-                out.constants[name] = file.number((kind, name), -FINITE, FINITE, name)
-    if "time_s" not in out.columns:
+    for name, rule in given["columns"].items():
+        if (unit := rule.setdefault("unit", "")) not in UNITS and (name, unit) != ("time_s", "iso"):
+            known = ", ".join(filter(None, UNITS))
+            raise file.refuse(f"unknown unit '{unit}' for {name}: {known}; time_s: iso", ("columns", name))
+    if "time_s" not in given["columns"]:
         raise file.refuse("the mapping has no time_s under [columns]", ("columns",))
-    return out
+    if "decimal" in given["file"] and given["file"]["decimal"] == given["file"].get("separator"):
+        raise file.refuse("separator and decimal cannot be the same", ("file", "separator"))
+    return given
 
 
-def _read_rule(file: TomlFile, name: str) -> _Rule:
-    at = ("columns", name)
-    rule = file.get(at)
-    given = file.table(at, ("column", "unit", "scale", "offset")) if isinstance(rule, dict) else {"column": rule}
-    sources = given.get("column")
-    sources = sources if isinstance(sources, list) else [sources]
-    if not sources or not all(isinstance(one, str) for one in sources):
-        raise file.refuse(f'{name} needs the source\'s column: {name} = {{ column = "its name" }}', at)
-    unit = str(given.get("unit", ""))
-    iso = name == "time_s" and unit == "iso"
-    if unit not in UNITS and not iso:
-        known = ", ".join(filter(None, UNITS))
-        raise file.refuse(f"unknown unit '{unit}' for {name}: {known}; time_s: iso", at)
-    factor, offset = (1.0, 0.0) if iso else UNITS[unit]
-    scale = file.number((*at, "scale"), -FINITE, FINITE, "scale") if "scale" in given else 1.0
-    shift = file.number((*at, "offset"), -FINITE, FINITE, "offset") if "offset" in given else 0.0
-    return _Rule(sources, factor * scale, offset + shift, iso)
+@dataclass
+class _Cells:
+    """Another logger's table as text: its cells, its lines (the header is the first) and their numbers."""
+
+    frame: pd.DataFrame
+    lines: list[str]
+    numbers: list[int]
+    separator: str
+    decimal: str
 
 
-def _split(path: str | Path, rules: _Mapping) -> tuple[pd.DataFrame, list[str], list[int]]:
-    """Return another logger's cells as text, its lines and their numbers; the header is the first of either."""
+def _split(path: str | Path, separator: str = "", decimal: str = "", skip_lines: int = 0) -> _Cells:
+    """Return a table's cells; what is not said of separator and decimal sign its header tells."""
     raw = read_bytes(path)
     try:
         text = raw.decode("utf-8-sig")
@@ -119,29 +116,25 @@ def _split(path: str | Path, rules: _Mapping) -> tuple[pd.DataFrame, list[str], 
     if not text.strip():
         raise InputError("the file is empty", path)
     numbered = enumerate(text.splitlines(), 1)
-    kept = [(n, one) for n, one in numbered if n > rules.skip_lines and one.strip() and one[0] != "#"]
+    kept = [(n, one) for n, one in numbered if n > skip_lines and one.strip() and one[0] != "#"]
     if not kept:
         raise InputError("only comments and skipped lines: there is no header", path, 1)
     numbers, lines = [n for n, _ in kept], [one for _, one in kept]
-    rules.separator = rules.separator or next((one for one in ";\t" if one in lines[0] and "," not in lines[0]), ",")
-    rules.decimal = rules.decimal or ("." if rules.separator == "," else ",")
+    separator = separator or next((one for one in ";\t" if one in lines[0] and "," not in lines[0]), ",")
     if len(lines) < 2:
         raise InputError("there is a header but no row", path, numbers[0])
     rows: list[list[str]] = []
     for number, line in kept:
         try:
-            (cells,) = csv.reader([line], delimiter=rules.separator, skipinitialspace=True)
+            (cells,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
         except csv.Error as error:
-            raise InputError(f"{error} (separator '{rules.separator}')", path, number, 1) from None
+            raise InputError(f"{error} (separator '{separator}')", path, number, 1) from None
         rows.append(cells)
         if len(cells) != len(rows[0]):
-            said = f"{len(cells)} cells where the header has {len(rows[0])} (separator '{rules.separator}')"
+            said = f"{len(cells)} cells where the header has {len(rows[0])} (separator '{separator}')"
             raise InputError(said, path, number, len(line) + 1)
-    names = [name.strip() for name in rows[0]]
-    for name in names:
-        if names.count(name) > 1 and any(name in rule.sources for rule in rules.columns.values()):
-            raise InputError(f"column '{name}' is there twice", path, numbers[0], 1)
-    return pd.DataFrame(rows[1:], columns=names, dtype=str), lines, numbers
+    frame = pd.DataFrame(rows[1:], columns=[name.strip() for name in rows[0]], dtype=str)
+    return _Cells(frame, lines, numbers, separator, decimal or ("." if separator == "," else ","))
 
 
 def import_table(path: str | Path, mapping: str | Path) -> str:
@@ -152,40 +145,46 @@ def import_table(path: str | Path, mapping: str | Path) -> str:
     may give `separator`, `decimal`, `skip_lines`; `[constants]` gives columns of one value.
     """
     rules = _read_mapping(mapping)
-    frame, lines, numbers = _split(path, rules)
-    out: dict[str, np.ndarray] = {}
-    for name, rule in rules.columns.items():
-        found = next((one for one in rule.sources if one in frame.columns), None)
-        if found is None:
-            has = ", ".join(f"'{one}'" for one in frame.columns[:12])
-            raise InputError(f"no column '{rule.sources[0]}' for {name}: the file has {has}", path, numbers[0], 1)
-        cells = frame[found].str.strip()
-        empty = cells.isin(["", "nan", "NaN", "NA", "-", "None"])
-        if rule.iso:
-            stamps = pd.to_datetime(cells.where(~empty), errors="coerce", format="ISO8601", utc=True)
-            values = (stamps - stamps.iloc[0]).dt.total_seconds()
-        else:
-            plain = cells.str.replace(rules.decimal, ".", regex=False) if rules.decimal != "." else cells
-            values = pd.to_numeric(plain.where(~empty), errors="coerce").replace([math.inf, -math.inf], math.nan)
-        bad = np.flatnonzero((values.isna() & (~empty | (name == "time_s"))).to_numpy())
-        if bad.size:
-            row = int(bad[0]) + 1
-            before = lines[row].split(rules.separator)[: list(frame.columns).index(found)]
-            raise InputError(
-                f"'{cells.iloc[row - 1]}' in column '{found}' is not a {'time' if rule.iso else 'number'}"
-                + ("" if rule.iso or rules.decimal == "," or "," not in cells.iloc[row - 1] else ' (decimal = ","?)'),
-                path,
-                numbers[row],
-                1 + sum(len(one) + 1 for one in before),
-            )
-        out[name] = values.to_numpy(float) * rule.factor + rule.offset
-    for name, value in rules.constants.items():
-        out[name] = np.full(len(frame), value)
+    table = _split(path, **rules["file"])
+    out = {name: _column(table, name, rule, path) for name, rule in rules["columns"].items()}
+    out |= {name: np.full(len(table.frame), value) for name, value in rules["constants"].items()}
     time_s = out.pop("time_s")
     for name in out:
         if re.fullmatch(r"t\d+_c", name):
             _refuse_kelvin(out[name], f'unit = "K" for {name} in the mapping converts', path)
     return log_text(time_s, out, {"imported_from": Path(path).name, "mapping": Path(str(mapping)).name}, 5)
+
+
+def _column(table: _Cells, name: str, rule: dict[str, Any], path: str | Path) -> np.ndarray:
+    """Return a log's column, (rows,), as its rule finds it in another logger's table."""
+    has, wanted = list(table.frame.columns), rule["column"]
+    found = next((one for one in wanted if one in has), None)
+    if found is None:
+        known = ", ".join(f"'{one}'" for one in has[:12])
+        raise InputError(f"no column '{wanted[0]}' for {name}: the file has {known}", path, table.numbers[0], 1)
+    if has.count(found) > 1:
+        raise InputError(f"column '{found}' is there twice", path, table.numbers[0], 1)
+    cells, iso = table.frame[found].str.strip(), rule["unit"] == "iso"
+    empty = cells.isin(["", "nan", "NaN", "NA", "-", "None"])
+    if iso:
+        stamps = pd.to_datetime(cells.where(~empty), errors="coerce", format="ISO8601", utc=True)
+        values = (stamps - stamps.iloc[0]).dt.total_seconds()
+    else:
+        plain = cells.str.replace(table.decimal, ".", regex=False)
+        values = pd.to_numeric(plain.where(~empty), errors="coerce").replace([math.inf, -math.inf], math.nan)
+    bad = np.flatnonzero((values.isna() & (~empty | (name == "time_s"))).to_numpy())
+    if bad.size:
+        row = int(bad[0]) + 1
+        shown, before = cells.iloc[row - 1], table.lines[row].split(table.separator)[: has.index(found)]
+        hint = ' (decimal = ","?)' if "," in shown and not iso and table.decimal != "," else ""
+        raise InputError(
+            f"'{shown}' in column '{found}' is not a {'time' if iso else 'number'}{hint}",
+            path,
+            table.numbers[row],
+            1 + sum(len(one) + 1 for one in before),
+        )
+    factor, offset = (1.0, 0.0) if iso else UNITS[rule["unit"]]
+    return values.to_numpy(float) * factor * rule.get("scale", 1.0) + offset + rule.get("offset", 0.0)
 
 
 @dataclass
@@ -204,37 +203,28 @@ def read_regions(path: str | Path) -> list[Region]:
 
     `[grid]`: rows, cols, left, top (centre of spring 1, pixels), step_x, step_y (pixels), width, height.
     """
-    file = TomlFile(path)
-    regions: list[Region] = []
-
-    def pixels(at: At, least: float, *keys: str) -> list[float]:
-        """Return numbers of a table, from the least that they may be."""
-        file.table(at, file.get(at))
-        return [file.number((*at, key), least, 1e5) for key in keys]
-
-    if file.get(grid := ("grid",)):
-        rows, cols = (int(one) for one in pixels(grid, 1, "rows", "cols"))
+    file, regions = TomlFile(path), []
+    given = file.read(Keys({"grid": _GRID, "region": [_REGION]}))
+    if grid := given.get("grid"):
+        rows, cols = grid["rows"], grid["cols"]
         if rows * cols > MAX_SPRINGS:
-            raise file.refuse(f"{rows} x {cols} are more than {MAX_SPRINGS} springs", (*grid, "rows"))
-        half_w, half_h = (one / 2 for one in pixels(grid, 1, "width", "height"))
-        left, top = pixels(grid, 0, "left", "top")
-        (step_x,) = pixels(grid, 1, "step_x") if cols > 1 else (0.0,)
-        (step_y,) = pixels(grid, 1, "step_y") if rows > 1 else (0.0,)
+            raise file.refuse(f"{rows} x {cols} are more than {MAX_SPRINGS} springs", ("grid", "rows"))
+        for key, count in (("step_x", cols), ("step_y", rows)):
+            if count > 1 and key not in grid:
+                raise file.refuse(f"[grid] is without {key}; add it", ("grid",))
         for k in range(rows * cols):
-            x, y = left + (k % cols) * step_x, top + (k // cols) * step_y
-            x0, y0 = round(x - half_w), round(y - half_h)
-            regions.append(Region(k + 1, x0, y0, max(round(x + half_w), x0 + 1), max(round(y + half_h), y0 + 1)))
-    for at in file.tables(("region",)):
-        left, top = (int(one) for one in pixels(at, 0, "left", "top"))
-        width, height, spring = (int(one) for one in pixels(at, 1, "width", "height", "spring"))
-        regions.append(Region(spring, left, top, left + width, top + height))
+            x = grid["left"] + (k % cols) * grid.get("step_x", 0.0) - grid["width"] / 2
+            y = grid["top"] + (k // cols) * grid.get("step_y", 0.0) - grid["height"] / 2
+            right, bottom = round(x + grid["width"]), round(y + grid["height"])
+            regions.append(Region(k + 1, round(x), round(y), max(right, round(x) + 1), max(bottom, round(y) + 1)))
+    for one in given.get("region", ()):
+        left, top = one["left"], one["top"]
+        regions.append(Region(one["spring"], left, top, left + one["width"], top + one["height"]))
     if not regions:
         raise InputError("no region: give [grid] or [[region]] tables", path, 1)
-    seen: set[int] = set()
-    for one in regions:
-        if not 1 <= one.spring <= MAX_SPRINGS or one.spring in seen:
-            raise InputError(f"spring {one.spring} is there twice or not in 1..{MAX_SPRINGS}", path)
-        seen.add(one.spring)
+    springs = sorted(one.spring for one in regions)
+    if twice := next((k for k, after in itertools.pairwise(springs) if k == after), None):
+        raise InputError(f"spring {twice} is there twice", path)
     return sorted(regions, key=lambda one: one.spring)
 
 

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import difflib
 import functools
+import operator
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, get_args, get_origin
+
+import msgspec
+from msgspec import Meta
 
 from ..errors import DECIMAL_COMMA, InputError
 from .logs import read_text
@@ -70,85 +75,79 @@ class TomlFile:
         """Return a refusal at that place."""
         return InputError(message, self.path, *self.place(at, name, word))
 
-    def get(self, at: At) -> Any:
-        """Return the value there, None where there is none."""
-        value: Any = self.data
-        for step in at:
-            value = value[step] if isinstance(step, int) else value.get(step)
-            if value is None:
-                return None
-        return value
+    def read(self, kind: Any, at: At = (), called: str = "") -> Any:
+        """Return what stands at `at`, where it is as `kind` says: Keys, a list of one kind, or a type that msgspec checks.
 
-    def table(self, at: At, names: Iterable[str]) -> dict[str, Any]:
-        """Return the table there ({} where there is none) that has no other keys than these."""
-        where = f"[{'.'.join(str(one) for one in at if isinstance(one, str))}]" if at else "the file"
-        table = self.get(at) if at else self.data
-        if table is None:
-            return {}
-        if not isinstance(table, dict):
+        Refused where it is otherwise; `called` is its name in a refusal.
+        """
+        return self._read(kind, at, functools.reduce(operator.getitem, at, self.data), called)
+
+    def _read(self, kind: Any, at: At, value: Any, called: str = "") -> Any:
+        tables = [str(one) for one in at if isinstance(one, str)]
+        if isinstance(kind, Keys):
+            return self._table(kind, at, value, f"[{'.'.join(tables)}]" if at else "the file")
+        if isinstance(kind, list):
+            if not isinstance(value, list):
+                raise self.refuse(f"{at[-1]} must be a list", at)
+            return [self._read(kind[0], (*at, k), one) for k, one in enumerate(value)]
+        try:
+            return msgspec.convert(value, kind)
+        except msgspec.ValidationError:
+            where = f"[{'.'.join(tables[:-1])}] " if tables[1:] else ""
+            raise self.refuse(f"{called or f'{where}{at[-1]}'} {_should_be(kind, value)}", at) from None
+
+    def _table(self, keys: Keys, at: At, value: Any, where: str) -> dict[str, Any]:
+        if not isinstance(value, dict):
             raise self.refuse(f"{where} must be a table", at)
-        known = list(names)
-        for key in table:
+        known = {key: keys.each for key in value} if keys.each else {**keys.must, **keys.may}
+        for key in value:
             if key not in known:
-                raise self.refuse(
-                    f"{where} has no key '{key}'{did_you_mean(key, known)}; it has {', '.join(known)}", (*at, key), True
-                )
-        return table
+                said = f"{where} has no key '{key}'{did_you_mean(key, known)}; it has {', '.join(known)}"
+                raise self.refuse(said, (*at, key), True)
+        for key in keys.must:
+            if key not in value:
+                raise self.refuse(f"{where} is without {key}; add it", at)
+        return {key: self._read(known[key], (*at, key), one) for key, one in value.items()}
 
-    def values(
-        self, at: At, numbers: Mapping[str, tuple[float, float]], words: Mapping[str, Sequence[str]] | None = None
-    ) -> dict[str, Any]:
-        """Return the table there: numbers within their limits, and keys whose value is one of some words."""
-        words = words or {}
-        where = f"[{'.'.join(map(str, at))}]"
-        out = dict(self.table(at, (*numbers, *words)))
-        for key, value in out.items():
-            if key in numbers:
-                out[key] = self.number((*at, key), *numbers[key], f"{where} {key}")
-            elif value not in words[key]:
-                has = f"{did_you_mean(str(value), words[key])}; it has {', '.join(words[key])}"
-                raise self.refuse(f"{where} {key} has no '{value}'{has}", (*at, key))
-        return out
 
-    def tables(self, at: At) -> list[At]:
-        """Return where the tables of a list stand."""
-        many = self.get(at)
-        if not isinstance(many, list | None):
-            raise self.refuse(f"{at[-1]} must be a list", at)
-        return [(*at, k) for k in range(len(many or []))]
+@dataclass(frozen=True)
+class Keys:
+    """What a table must have and may have, each with the kind of its value; `each`: any key, all of one kind."""
 
-    def need(self, at: At) -> Any:
-        """Return the value there; refused where there is none."""
-        value = self.get(at)
-        if value is None:
-            table = at[:-1]
-            where = f"[{table[0]}]" if table else "the file"
-            raise self.refuse(f"{where} is without {at[-1]}; add it", table)
-        return value
+    may: Mapping[str, Any] = field(default_factory=dict)
+    must: Mapping[str, Any] = field(default_factory=dict)
+    each: Any = None
 
-    def text_at(self, at: At) -> str:
-        """Return the text there."""
-        value = self.need(at)
-        if not isinstance(value, str):
-            raise self.refuse(f"{at[-1]} must be text in quotes", at)
-        return value
 
-    def number(self, at: At, low: float, high: float, called: str = "") -> float:
-        """Return the number there."""
-        value = self.need(at)
-        called = called or f"[{at[0]}] {at[-1]}"
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.refuse(f"{called} must be a number, without quotes", at)
-        if not low <= value <= high:
-            raise self.refuse(f"{called} is {value:g}; it must be {low:g} to {high:g}", at)
-        return float(value)
+def number(low: float, high: float) -> Any:
+    """Return the kind of a number within limits."""
+    return Annotated[float, Meta(ge=low, le=high)]
 
-    def whole(self, at: At, low: int, high: int) -> int:
-        """Return the whole number there."""
-        value = self.need(at)
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            raise self.refuse(f"[{at[0]}] {at[-1]} must be a whole number, {low} to {high}", at)
-        return value
+
+def whole(low: int, high: int) -> Any:
+    """Return the kind of a whole number within limits."""
+    return Annotated[int, Meta(ge=low, le=high)]
+
+
+def table(numbers: Mapping[str, tuple[float, float]], words: Mapping[str, Sequence[str]] | None = None) -> Keys:
+    """Return the kind of a table that may have these numbers within their limits, and these keys of some words each."""
+    kinds = {key: number(*limits) for key, limits in numbers.items()}
+    return Keys(kinds | {key: Literal[tuple(names)] for key, names in (words or {}).items()})
+
+
+def _should_be(kind: Any, value: Any) -> str:
+    """Return what a value is, and what it should be, in words."""
+    if get_origin(kind) is Literal:
+        names = get_args(kind)
+        return f"has no '{value}'{did_you_mean(str(value), names)}; it has {', '.join(names)}"
+    base, limits = get_args(kind) or (kind, Meta())
+    if base is int:
+        return f"must be a whole number, {limits.ge} to {limits.le}"
+    if base is not float:
+        return f"must be {limits.description or 'text in quotes'}"
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return "must be a number, without quotes"
+    return f"is {value:g}; it must be {limits.ge:g} to {limits.le:g}"
 
 
 def did_you_mean(wrong: str, names: Iterable[str]) -> str:

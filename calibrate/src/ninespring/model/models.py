@@ -15,11 +15,10 @@ from typing import Any
 from .. import __version__
 from ..errors import InputError
 from ..io.logs import Run
-from ..io.toml_file import At, TomlFile, did_you_mean
+from ..io.toml_file import At, Keys, TomlFile, did_you_mean, number, table, whole
 from . import cooling, native, stiffness
 
 SCHEMA = "ninespring.model/1"
-TABLES = ("array", "spring", "material", "sensor", "stiffness", "board")
 ROOMS = ("room_over_first_k", "room_over_first_sigma_k", "room_first_minute_misses_k")
 ERRORS = ("rmse_before_c", "rmse_after_c", "hottest_c", *ROOMS)
 SPRING_KEYS = {
@@ -46,6 +45,31 @@ COUPLED = ("orthogonal_", "diagonal_", "second_", "wake_w")
 """What the stiffness layer has times `stiffness_coupling_scale`."""
 BOARD_KEYS = {"supply_limit_a": (0.1, 60.0), "boost_current_a": (0.1, 3.2), "open_current_a": (0.0, 3.2)}
 """Of `[board.K]`: settings of the chip, within its limits."""
+
+_SHAPE = {key: whole(1, native.MAX_SPRINGS) for key in ("rows", "cols")}
+_BOARD_SHAPE = {key: whole(1, native.BOARD_SPRINGS) for key in ("board_rows", "board_cols")}
+TABLES = {
+    "array": Keys({"pitch_mm": number(0.1, 1000.0), **_BOARD_SHAPE}, _SHAPE),
+    "spring": table(SPRING_KEYS),
+    "material": table(MATERIAL_KEYS),
+    "sensor": Keys({"kind": str, "noise_c": number(0.0, 50.0)}),
+    "stiffness": table(STIFFNESS_KEYS, stiffness.WORDS),
+    "board": Keys(each=table(BOARD_KEYS)),
+}
+"""What array.toml and model.toml say of an array."""
+_PARAMETER = Keys(
+    {"stderr": number(0.0, 1e12), "spring": whole(1, native.MAX_SPRINGS), "effect": str, "kept": str},
+    {"name": str, "value": float, "unit": str},
+)
+_PROVENANCE = Keys(
+    {
+        **{key: str for key in ("tool", "date", "note")},
+        **{key: number(-100.0, 1e6) for key in ERRORS},
+        "doubts": [str],
+        "logs": [Keys(must={"file": str, "sha256": str})],
+    }
+)
+MODEL = Keys(TABLES | {"effects": [str], "parameter": [_PARAMETER], "provenance": _PROVENANCE}, {"schema": str})
 
 
 @dataclass
@@ -159,92 +183,71 @@ def model_of_layer(model: Model, layer: str) -> Model:
     return out
 
 
-def _array(file: TomlFile) -> Array:
-    if file.get(("array",)) is None:
+def _array(file: TomlFile, given: dict[str, Any]) -> Array:
+    """Return the array of a file's tables, its shape looked at."""
+    if "array" not in given:
         raise file.refuse("there is no [array] table; add rows and cols", ())
-    file.table(("array",), ("rows", "cols", "pitch_mm", "board_rows", "board_cols"))
-    array = Array(*(file.whole(("array", key), 1, native.MAX_SPRINGS) for key in ("rows", "cols")))
-    if file.get(("stiffness",)) is not None:
-        array.stiffness = file.values(("stiffness",), STIFFNESS_KEYS, stiffness.WORDS)
+    shape = given["array"]
+    parts = {name: given.get(name, {}) for name in ("spring", "material", "sensor", "cooling")}
+    array = Array(shape["rows"], shape["cols"], shape.get("pitch_mm"), **parts, stiffness=given.get("stiffness"))
     if array.springs > native.MAX_SPRINGS:
         two = " in two layers" if array.layers == 2 else ""
         said = f"{array.rows} x {array.cols}{two} are more than {native.MAX_SPRINGS} springs"
         raise file.refuse(said, ("array", "cols"))
-    _boards(file, array)
-    if file.get(("array", "pitch_mm")) is not None:
-        array.pitch_mm = file.number(("array", "pitch_mm"), 0.1, 1000.0)
-    array.spring = file.values(("spring",), SPRING_KEYS)
-    array.material = file.values(("material",), MATERIAL_KEYS)
-    array.sensor = dict(file.table(("sensor",), ("kind", "noise_c")))
-    if "kind" in array.sensor:
-        file.text_at(("sensor", "kind"))
-    if "noise_c" in array.sensor:
-        file.number(("sensor", "noise_c"), 0.0, 50.0)
-    return array
-
-
-def _boards(file: TomlFile, array: Array) -> None:
-    sizes = [key for key in ("board_rows", "board_cols") if file.get(("array", key)) is not None]
+    sizes = [key for key in ("board_rows", "board_cols") if key in shape]
     if len(sizes) == 1:
         raise file.refuse("[array] board_rows and board_cols go together", ("array", sizes[0]))
     if sizes:
-        rows, cols = (file.whole(("array", key), 1, native.BOARD_SPRINGS) for key in sizes)
+        rows, cols = array.board = tuple(shape[key] for key in sizes)
         if min(rows, array.rows) * min(cols, array.cols) > native.BOARD_SPRINGS:
             said = f"{rows} x {cols} are more than {native.BOARD_SPRINGS} springs on a board"
             raise file.refuse(said, ("array", "board_cols"))
-        array.board = rows, cols
-    count = len(array.parts)
-    for number in file.table(("board",), file.get(("board",)) or ()):
-        if not number.isdecimal() or not 1 <= int(number) <= count or number.startswith("0"):
-            raise file.refuse(f"[board.{number}], but the array has board 1 to {count}", ("board", number))
-        array.boards[int(number)] = file.values(("board", number), BOARD_KEYS)
+    boards = [str(k + 1) for k in range(len(array.parts))]
+    for name, own in given.get("board", {}).items():
+        if name not in boards:
+            raise file.refuse(f"[board.{name}], but the array has board 1 to {len(boards)}", ("board", name))
+        array.boards[int(name)] = own
+    return array
 
 
 def read_array(path: str | Path) -> Array:
     """Read array.toml; refused with file, line and column where it breaks docs/files.md."""
     file = TomlFile(path)
-    file.table((), (*TABLES, "cooling"))
-    array = _array(file)
-    array.cooling = file.values(("cooling",), cooling.NUMBERS, cooling.WORDS)
-    return array
+    return _array(file, file.read(Keys({**TABLES, "cooling": table(cooling.NUMBERS, cooling.WORDS)})))
 
 
 def read_model(path: str | Path) -> Model:
     """Read model.toml; refused with file, line and column where it breaks docs/files.md."""
     file = TomlFile(path)
-    file.table((), ("schema", *TABLES, "effects", "parameter", "provenance"))
-    if (schema := file.text_at(("schema",))) != SCHEMA:
+    if (schema := file.data.get("schema", SCHEMA)) != SCHEMA:
         raise file.refuse(f"schema is '{schema}'; this version reads \"{SCHEMA}\"", ("schema",))
-    model = Model(_array(file), name=str(path))
-    for at in file.tables(("effects",)):
-        name = file.get(at)
+    given = file.read(MODEL)
+    model = Model(_array(file, given), name=str(path), provenance=given.get("provenance", {}))
+    for name in given.get("effects", ()):
         if name not in native.effect_names():
-            said = f"there is no effect '{name}'{did_you_mean(str(name), native.effect_names())}"
-            raise file.refuse(said, ("effects",), word=str(name))
+            said = f"there is no effect '{name}'{did_you_mean(name, native.effect_names())}"
+            raise file.refuse(said, ("effects",), word=name)
         if name in model.effects:
-            raise file.refuse(f"effect {name} appears twice; remove one", ("effects",), word=str(name))
+            raise file.refuse(f"effect {name} appears twice; remove one", ("effects",), word=name)
         model.effects.append(name)
-    for at in file.tables(("parameter",)):
-        _read_parameter(file, at, model)
-    _check_provenance(file)
-    model.provenance = dict(file.data.get("provenance", {}))
+    for k, entry in enumerate(given.get("parameter", ())):
+        _take_parameter(file, ("parameter", k), entry, model)
     return model
 
 
-def _read_parameter(file: TomlFile, at: At, model: Model) -> None:
-    entry = file.table(at, ("name", "value", "unit", "stderr", "spring", "effect", "kept"))
-    name, table = file.text_at((*at, "name")), native.parameter_table()
+def _take_parameter(file: TomlFile, at: At, entry: dict[str, Any], model: Model) -> None:
+    name, table = entry["name"], native.parameter_table()
     if name not in table:
         raise file.refuse(f"there is no parameter '{name}'{did_you_mean(name, table)}", (*at, "name"))
     known = table[name]
-    value = file.number((*at, "value"), known.minimum, known.maximum, name)
-    if (unit := file.text_at((*at, "unit"))) != known.unit:
-        raise file.refuse(f"{name} is in '{known.unit}', not in '{unit}'; convert the value", (*at, "unit"))
+    value = file.read(number(known.minimum, known.maximum), (*at, "value"), name)
+    if entry["unit"] != known.unit:
+        raise file.refuse(f"{name} is in '{known.unit}', not in '{entry['unit']}'; convert the value", (*at, "unit"))
     if "effect" in entry and entry["effect"] != known.effect:
         raise file.refuse(f"{name} belongs to {known.effect or 'no effect'}; remove or correct effect", (*at, "effect"))
     full = name
     if "spring" in entry:
-        spring = file.whole((*at, "spring"), 1, model.array.springs)
+        spring = file.read(whole(1, model.array.springs), (*at, "spring"))
         if not known.per_spring:
             raise file.refuse(f"{name} is of the whole array; remove spring", (*at, "spring"))
         full = f"{name}[{spring}]"
@@ -252,29 +255,13 @@ def _read_parameter(file: TomlFile, at: At, model: Model) -> None:
         raise file.refuse(f"parameter {full} appears twice; remove one", (*at, "value"))
     model.parameters[full] = value
     model.places[full] = file.place((*at, "value"))
-    if "stderr" in entry:
-        model.stderr[full] = file.number((*at, "stderr"), 0.0, 1e12, f"{name} stderr")
-    if "kept" in entry:
-        model.kept[full] = file.text_at((*at, "kept"))
+    for key, kept in (("stderr", model.stderr), ("kept", model.kept)):
+        if key in entry:
+            kept[full] = entry[key]
 
 
-def _check_provenance(file: TomlFile) -> None:
-    given = file.table(("provenance",), ("tool", "date", "logs", *ERRORS, "note", "doubts"))
-    for key in given:
-        if key in ERRORS:
-            file.number(("provenance", key), -100.0, 1e6)
-        elif key not in ("logs", "doubts"):
-            file.text_at(("provenance", key))
-    for at in file.tables(("provenance", "doubts")):
-        file.text_at(at)
-    for at in file.tables(("provenance", "logs")):
-        file.table(at, ("file", "sha256"))
-        file.text_at((*at, "file"))
-        file.text_at((*at, "sha256"))
-
-
-def _value(number: float) -> str:
-    text = f"{number:.7g}"
+def _value(one: float) -> str:
+    text = f"{one:.7g}"
     return text if any(c in text for c in ".en") else f"{text}.0"
 
 
