@@ -89,7 +89,10 @@ def test_a_steady_table_is_diagnosed_with_a_report_and_a_model(tmp_path: Path) -
     assert result == json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert [c["measured_c"] for c in result["cases"]] == [63, 57, 49]
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "<svg" in page and result["rivals"][0]["separating_experiment"] in page
+    cases = page.partition("<h2>Cases</h2>")[2].partition("<h2>")[0]
+    shown = [f"{one[when]:.1f}" for one in result["cases"] for when in ("measured_c", "before_c", "after_c")]
+    assert re.findall(r'class="n">([\d.]+)<', cases) == shown
+    assert result["rivals"][0]["separating_experiment"] in page
     assert read_model(tmp_path / "out" / "model.toml").effects == [result["effects"][0]["name"]]
     assert result["warnings"][0] in done.stdout.replace("\n", " ")
     refused = ninespring("fit", tmp_path / "steady.csv", "-o", tmp_path / "m.toml")

@@ -79,7 +79,7 @@ def test_a_logger_in_other_units_is_read_back_in_the_logs(
 @pytest.mark.parametrize(
     ("mapping", "logger", "place", "word"),
     [
-        ("[columns]\ntime = 1\n", "t\n1\n", "map.toml:2", "'time' is not a log's column"),
+        ('[columns]\ntime = "t"\n', "t\n1\n", "map.toml:2", "'time' is not a log's column"),
         ('[columns]\ntime_s = "t"\n[more]\n', "t\n1\n", "map.toml:3", "no key 'more'"),
         ('[columns]\ntime_s = {column = "t", unit = "furlong"}\n', "t\n1\n", "map.toml:2", "unknown unit"),
         ('[columns]\ntime_s = {unit = "s"}\n', "t\n1\n", "map.toml:2", "column"),

@@ -14,11 +14,10 @@ import numpy as np
 
 from ..find.diagnosis import Diagnosis
 from ..infer.fit import Fit
-from ..io import results, statistics
+from ..io import statistics
 from ..io.logs.run import Run
 
 INK, MEASURED, BEFORE, AFTER = "#1d2733", "#9aa7b4", "#c8553d", "#1f77a4"
-PAPER = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
 plt.rcParams.update(
     {"svg.fonttype": "none", "font.family": "sans-serif", "text.color": INK, "axes.edgecolor": "#c3ccd4"}
 )
@@ -159,26 +158,6 @@ def unknown_heat(found: Diagnosis) -> str:
     return as_svg(figure)
 
 
-def error_bars(told: results.Diagnosis) -> str:
-    """Draw the held-out errors before and after, and the noise."""
-    before = told.baseline
-    rows = (
-        ("before", before.holdout_rmse_c, BEFORE),
-        ("after", told.after.holdout_rmse_c, AFTER),
-        ("noise", before.noise_c, MEASURED),
-    )
-    figure, axis = plt.subplots(figsize=(4.2, 1.5))
-    for at, (name, value, colour) in enumerate(rows):
-        axis.barh(-at, value, color=colour, height=0.7)
-        beside = {"textcoords": "offset points", "va": "center", "fontsize": 9}  # a browser drops blanks at the ends
-        axis.annotate(f"{value:.2f} K", (value, -at), (4, 0), **beside)
-        axis.annotate(name, (0, -at), (-4, 0), ha="right", **beside)
-    axis.set_xlim(0, max(value for _, value, _ in rows) * 1.25)
-    axis.set_axis_off()
-    axis.set_title("error on held-out blocks", fontsize=9, loc="left")
-    return as_svg(figure)
-
-
 def maps(found: Diagnosis) -> str:
     """Draw where the error sits: rms and mean of each spring, before and after."""
     problem = found.problem
@@ -223,55 +202,5 @@ def autocorrelation(found: Diagnosis) -> str:
         axis.legend(fontsize=8, frameon=False)
         axis.grid(alpha=0.25)
         axis.tick_params(labelsize=8)
-    figure.tight_layout()
-    return as_svg(figure)
-
-
-def evidence(found: Diagnosis) -> str:
-    """Draw the errors of the models that were fitted on the way."""
-    rows = [one for one in found.told.candidates if one.effects][:14]
-    if not rows:
-        return ""
-    figure, axis = plt.subplots(figsize=(12, 0.34 * len(rows) + 0.9))
-    y = np.arange(len(rows))[::-1]
-    colours = [AFTER if one.adopted else MEASURED for one in rows]
-    axis.barh(y, [one.rmse_c for one in rows], color=colours, height=0.7)
-    axis.axvline(found.told.baseline.noise_c, color=INK, lw=1, ls="--", zorder=0)
-    axis.axvline(found.told.baseline.rmse_c, color=BEFORE, lw=1, zorder=0)
-    axis.set_yticks(y, [" + ".join(one.effects) for one in rows], fontsize=8)
-    for at, one in zip(y, rows, strict=True):
-        axis.annotate(
-            f"{one.rmse_c:.3f} K, {one.evidence_over_baseline:+.0f} nats",
-            (one.rmse_c, at),
-            (5, 0),
-            textcoords="offset points",
-            va="center",
-            fontsize=8,
-            bbox=PAPER,
-        )
-    axis.set_xlim(0, max(one.rmse_c for one in rows) * 1.3)
-    axis.set_xlabel("rms error, K (dashed: noise; red: before)", fontsize=9)
-    axis.spines[["top", "right"]].set_visible(False)
-    figure.tight_layout()
-    return as_svg(figure)
-
-
-def cases(told: results.SteadyDiagnosis) -> str:
-    """Draw a steady table's cases: measured, model before, model after."""
-    listed = told.cases
-    figure, axis = plt.subplots(figsize=(12, 0.34 * len(listed) + 1.2))
-    y = np.arange(len(listed))[::-1]
-    for key, colour, label, marker, size in (
-        ("measured_c", MEASURED, "measured", "o", 11),
-        ("before_c", BEFORE, "model before", "o", 6),
-        ("after_c", AFTER, "model after", "D", 5),
-    ):
-        if getattr(listed[0], key) is not results.UNSET:
-            axis.plot([getattr(one, key) for one in listed], y, marker, color=colour, ms=size, label=label)
-    axis.set_yticks(y, [one.case for one in listed], fontsize=9)
-    axis.set_xlabel("temperature, °C", fontsize=9)
-    axis.grid(alpha=0.25)
-    axis.spines[["top", "right"]].set_visible(False)
-    axis.legend(fontsize=9, frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1, 1))
     figure.tight_layout()
     return as_svg(figure)

@@ -20,6 +20,8 @@ from . import figures
 
 HEADER = ("effect", "its one number", "error, K", "left one out, K", "what speaks against it")
 """Of `candidate_rows`."""
+MOST_TRIED = 14
+"""Of the models fitted on the way, so many are listed."""
 
 
 def render(template: str, **said: Any) -> str:
@@ -157,11 +159,9 @@ def html_report(found: Diagnosis, folder: str = "diagnosis") -> str:
     told = found.told
     drawn = {
         "array_map": figures.array_map(found),
-        "error_bars": figures.error_bars(told),
         "maps": figures.maps(found),
         "unknown_heat": figures.unknown_heat(found),
         "autocorrelation": figures.autocorrelation(found),
-        "evidence": figures.evidence(found),
     }
     traces = [(Markup(svg), Markup(left)) for svg, left in figures.traces(found)]
     return render(
@@ -176,6 +176,16 @@ def html_report(found: Diagnosis, folder: str = "diagnosis") -> str:
         runs=list(zip(found.problem.runs, traces, strict=True)),
         numbers={name: one for effect in told.effects for name, one in effect.parameters.items()},
         undetermined=_undetermined(told),
+        tried=[
+            (
+                " + ".join(one.effects),
+                f"{one.rmse_c:.3f}",
+                f"{one.evidence_over_baseline:+.0f}",
+                "adopted" if one.adopted else "",
+            )
+            for one in told.candidates
+            if one.effects
+        ][:MOST_TRIED],
         least_gain=search.MIN_GAIN,
         least_evidence=search.MIN_EVIDENCE,
         known=list(effects.IN_WORDS),
@@ -188,7 +198,6 @@ def steady_report(told: results.SteadyDiagnosis) -> str:
         "steady.html",
         title="Ninespring diagnosis",
         told=told,
-        figure=Markup(figures.cases(told)),
         header=HEADER,
         candidates=candidate_rows(told),
     )
