@@ -44,9 +44,8 @@ SCRIPT_ALIVE_EVERY_S = 0.2
 DRIVES = re.compile(r"\s*(on|pattern)\b", re.IGNORECASE)
 STATUS = re.compile(r"^<(off|on|fault|locked)\|t:.*>$")
 """What `?` is answered with."""
-ROW_TIME = re.compile(r"^(\d+\.\d+),")
-TICK_TIME = re.compile(r"^~S([0-9A-F]{4})")
-"""In ticks of 20 ms, modulo 65536."""
+CLOCK = re.compile(r"(?P<row_s>\d+\.\d+),|~S(?P<tick>[0-9A-F]{4})")
+"""The board's time in a row, or in ticks of 20 ms, modulo 65536."""
 
 
 @dataclass(frozen=True)
@@ -115,19 +114,15 @@ class Board:
         self._simulated: subprocess.Popen[str] | None = None
         self.patience = PATIENCE if port == SIMULATED else 1.0
         """Times as long as usual everything may take."""
-        if port == SIMULATED:
-            self._simulated, port, self.thermometers = simulated_board(simulated)
-        self.port = port
-        try:
+        with contextlib.ExitStack() as undo:
+            if port == SIMULATED:
+                self._simulated, port, self.thermometers = simulated_board(simulated)
+                undo.callback(self._end_simulation)
+            self.port = port
             self._port = Port(port)
-            try:
-                self._greet()
-            except BaseException:
-                self._port.close()
-                raise
-        except BaseException:
-            self._end_simulation()
-            raise
+            undo.callback(self._port.close)
+            self._greet()
+            undo.pop_all()
 
     def __repr__(self) -> str:
         return f"<board at {self.port}: {self.version[0] if self.version else 'closed'}>"
@@ -281,9 +276,8 @@ class Board:
         self._port.write("\n")  # an empty line is not answered, but shows that this end lives
 
     def _came(self, line: str) -> str:
-        row, tick = ROW_TIME.match(line), TICK_TIME.match(line)
-        if row or tick:
-            board_s = float(row[1]) if row else 0.02 * int(tick[1], 16) if tick else 0.0
+        if match := CLOCK.match(line):
+            board_s = float(match["row_s"] or 0.02 * int(match["tick"] or "0", 16))
             if not 0.0 <= board_s - self._alive_board_s < ALIVE_EVERY_S:
                 self._alive_board_s = board_s
                 self._show_life()
@@ -443,7 +437,7 @@ def shape_of(settings: Mapping[str, str], springs: int) -> tuple[int, int]:
 EACH = {"current_a": "i{}_a", "voltage_v": "v{}_v", "temperature_c": "m{}_c"}
 EACH |= {"low_c": "low{}_c", "high_c": "high{}_c", "austenite": "x{}", "duty": "d{}"}
 """What a Reading has of each spring, and how its columns are called."""
-BELIEVED = frozenset({"low_c", "high_c", "austenite"})
+BELIEVED = ("low_c", "high_c", "austenite")
 """What of it telemetry does not tell."""
 
 
@@ -463,15 +457,11 @@ def to_pandas(readings: Iterable[Reading]) -> pd.DataFrame:
 
 def reading(cells: Mapping[str, str], believed: Mapping[int, Belief] | None = None) -> Reading:
     """Return a row of telemetry, and what is believed beside it, as numbers; ValueError where it is none."""
-    springs = range(1, 1 + springs_in(cells))
-
-    def of_each(name: str) -> np.ndarray:
-        if name in BELIEVED:
-            return np.array([getattr((believed or {}).get(k), name, math.nan) for k in springs])
-        return np.array([float(cells.get(EACH[name].format(k), "nan")) for k in springs])
-
+    springs, believed = range(1, 1 + springs_in(cells)), believed or {}
+    each = {name: [float(cells.get(column.format(k), "nan")) for k in springs] for name, column in EACH.items()}
+    each |= {name: [getattr(believed.get(k), name, math.nan) for k in springs] for name in BELIEVED}
     of_all = {name: float(cells[name]) for name in ("time_s", "fan", "ambient_c")}
-    return Reading(**of_all, state=cells["state"], **{name: of_each(name) for name in EACH})
+    return Reading(**of_all, state=cells["state"], **{name: np.array(values) for name, values in each.items()})
 
 
 UNSAVED = "nothing is saved, a reset of the board gives back what it had"
@@ -507,13 +497,11 @@ def send_settings(
 
 def settings_that_differ(sent: Mapping[str, str], has: Mapping[str, str]) -> list[str]:
     """Return what a board shows otherwise than it was sent, in words."""
-    out = []
-    for name, value in sent.items():
-        if name not in has:
-            out.append(f"{name} is missing")
-        elif float(has[name]) != float(value):
-            out.append(f"{name} is {has[name]}, not {value}")
-    return out
+    return [
+        f"{name} is {has[name]}, not {value}" if name in has else f"{name} is missing"
+        for name, value in sent.items()
+        if name not in has or float(has[name]) != float(value)
+    ]
 
 
 def as_lines(settings: Mapping[str, str]) -> str:

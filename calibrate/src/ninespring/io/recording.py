@@ -121,25 +121,20 @@ def script_lines(text: str, name: str, duration_s: float = math.inf) -> list[Ste
             continue
         if not line.isascii():
             raise InputError("the console takes plain ASCII", name, number, 1)
-        place = f"{name}:{number}:1: "
-        step = Step(line, place=place)
-        if re.match(r"at\b", line):
-            match = re.fullmatch(r"at\s+(\d+(?:\.\d*)?)\s*=\s*(\S.*)", line)
-            if not match:
-                raise InputError(f"'{line[:40]}' is not `at SECONDS = console line`", name, number, 1)
-            at_s = float(match[1])
-            step = Step(match[2], at_s, place)
-            if steps and steps[-1].at_s is not None and steps[-1].at_s > at_s:
-                raise InputError("times of a script must not fall", name, number, 1)
-            if at_s >= duration_s:
-                raise InputError(
-                    f"{at_s:g} s is not before the end of the recording, `--duration {duration_s:g}`", name, number, 1
-                )
-        elif steps and steps[-1].at_s is not None:
-            raise InputError(
-                f"'{line[:40]}' comes after timed lines: give it a time, `at SECONDS = ...`", name, number, 1
-            )
-        steps.append(step)
+        match = re.fullmatch(r"at\s+(\d+(?:\.\d*)?)\s*=\s*(\S.*)", line)
+        at_s, before_s = float(match[1]) if match else None, steps[-1].at_s if steps else None
+        wrong = ""
+        if at_s is None and re.match(r"at\b", line):
+            wrong = f"'{line[:40]}' is not `at SECONDS = console line`"
+        elif at_s is None and before_s is not None:
+            wrong = f"'{line[:40]}' comes after timed lines: give it a time, `at SECONDS = ...`"
+        elif at_s is not None and at_s < (before_s or 0.0):
+            wrong = "times of a script must not fall"
+        elif at_s is not None and at_s >= duration_s:
+            wrong = f"{at_s:g} s is not before the end of the recording, `--duration {duration_s:g}`"
+        if wrong:
+            raise InputError(wrong, name, number, 1)
+        steps.append(Step(match[2] if match else line, at_s, f"{name}:{number}:1: "))
     return steps
 
 
@@ -284,20 +279,10 @@ class LogFile:
             self.part.unlink()
 
     def _give_name(self, part: Path) -> None:
-        if self._force or (self.path.exists() and self.path.stat().st_size == 0):
+        if self._force or not self.path.exists() or self.path.stat().st_size == 0:
             os.replace(part, self.path)
-            return
-        try:
-            os.link(part, self.path)  # unlike a rename, it takes the place of nothing
-        except FileExistsError:
+        else:  # it has come meanwhile
             self.path = part
-        except OSError:  # a file system without links
-            if self.path.exists():
-                self.path = part
-            else:
-                os.replace(part, self.path)
-        else:
-            part.unlink()
 
 
 @contextlib.contextmanager

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import datetime
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -260,57 +260,41 @@ def _take_parameter(file: TomlFile, at: At, entry: dict[str, Any], model: Model)
             kept[full] = entry[key]
 
 
-def _value(one: float) -> str:
+def _value(one: Any) -> str:
+    if isinstance(one, list):
+        return f"[{', '.join(map(_value, one))}]"
+    if isinstance(one, str | int):
+        return json.dumps(one, ensure_ascii=False)
     text = f"{one:.7g}"
     return text if any(c in text for c in ".en") else f"{text}.0"
 
 
+def _lines(header: str, table: Mapping[str, Any]) -> list[str]:
+    """Return a table of TOML, without what is None."""
+    return ["", header, *(f"{key} = {_value(one)}" for key, one in table.items() if one is not None)]
+
+
 def model_text(model: Model) -> str:
     """Return model.toml as text: what `read_model` and the host tools read."""
-    lines = [f'schema = "{SCHEMA}"']
-    lines.append(f"effects = [{', '.join(json.dumps(e) for e in model.effects)}]")
-    array = model.array
-    lines += ["", "[array]", f"rows = {array.rows}", f"cols = {array.cols}"]
-    if array.pitch_mm is not None:
-        lines.append(f"pitch_mm = {_value(array.pitch_mm)}")
-    if array.board is not None:
-        lines += [f"board_rows = {array.board[0]}", f"board_cols = {array.board[1]}"]
-    tables = {name: getattr(array, name) for name in ("spring", "material", "sensor")}
-    tables |= {f"board.{number}": own for number, own in array.boards.items()}
-    for name, part in (tables | {"stiffness": array.stiffness}).items():
-        if part or (name == "stiffness" and part is not None):
-            lines += ["", f"[{name}]"]
-            lines += [f"{key} = {json.dumps(v) if isinstance(v, str) else _value(v)}" for key, v in part.items()]
-    table = native.parameter_table()
+    array, table = model.array, native.parameter_table()
+    lines = [f'schema = "{SCHEMA}"', f"effects = {_value(list(model.effects))}"]
+    shape = {"rows": array.rows, "cols": array.cols, "pitch_mm": array.pitch_mm}
+    lines += _lines("[array]", shape | dict(zip(_BOARD_SHAPE, array.board or (), strict=False)))
+    parts = {name: getattr(array, name) or None for name in ("spring", "material", "sensor")}
+    parts |= {f"board.{number}": own for number, own in array.boards.items()} | {"stiffness": array.stiffness}
+    for name, part in parts.items():
+        lines += [] if part is None else _lines(f"[{name}]", part)
     for full, value in model.parameters.items():
-        name, _, rest = full.partition("[")
-        known = table[name]
-        lines += ["", "[[parameter]]", f'name = "{name}"']
-        if rest:
-            lines.append(f"spring = {int(rest[:-1])}")
-        lines += [f"value = {_value(value)}", f'unit = "{known.unit}"']
-        if full in model.stderr:
-            lines.append(f"stderr = {_value(model.stderr[full])}")
-        if known.effect:
-            lines.append(f'effect = "{known.effect}"')
-        if full in model.kept:
-            lines.append(f"kept = {json.dumps(model.kept[full], ensure_ascii=False)}")
-    made = {
-        "tool": f"ninespring {__version__}",
-        "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
-    } | model.provenance
-    lines += ["", "[provenance]"]
-    for key in ("tool", "date", "note"):
-        if key in made:
-            lines.append(f"{key} = {json.dumps(made[key])}")
-    if made.get("doubts"):
-        lines.append(f"doubts = {json.dumps(made['doubts'], ensure_ascii=False)}")
-    for key in ERRORS:
-        if made.get(key) is not None:
-            lines.append(f"{key} = {_value(made[key])}")
+        name, _, of_one = full.partition("[")
+        entry = {"name": name, "spring": int(of_one[:-1]) if of_one else None, "value": float(value)}
+        entry |= {"unit": table[name].unit, "stderr": model.stderr.get(full), "effect": table[name].effect}
+        lines += _lines("[[parameter]]", entry | {"kept": model.kept.get(full)})
+    now = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    made = {"tool": f"ninespring {__version__}", "date": now} | model.provenance
+    made["doubts"] = made.get("doubts") or None
+    lines += _lines("[provenance]", {key: made.get(key) for key in ("tool", "date", "note", "doubts", *ERRORS)})
     for log in made.get("logs", []):
-        lines += ["", "[[provenance.logs]]", f"file = {json.dumps(log['file'])}"]
-        lines.append(f'sha256 = "{log["sha256"]}"')
+        lines += _lines("[[provenance.logs]]", {key: log[key] for key in ("file", "sha256")})
     return "\n".join(lines) + "\n"
 
 
