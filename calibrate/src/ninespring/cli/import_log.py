@@ -42,9 +42,6 @@ map.toml:                                          regions.toml (pixels):
 @click.option("--times", type=FILE, help="times of the frames, s on the log's clock, one a line")
 @number("--offset", ranges.OFFSET_S, "s to add to the frames' times", 0.0)
 @click.option(
-    "--statistic", type=click.Choice(["mean", "median", "max"]), default="mean", help="of the pixels of a region"
-)
-@click.option(
     "--log",
     "log_path",
     type=FILE,
@@ -61,7 +58,6 @@ def import_(
     unit: str,
     offset: float,
     times: Path | None,
-    statistic: str,
     log_path: Path | None,
     output: Path,
     force: bool,
@@ -85,9 +81,8 @@ def import_(
         if stamps is not None and len(stamps) != count:
             raise InputError(f"{len(stamps)} times for {count} frames", times)
         with working("reading frames", count) as say:
-            columns = importing.reduce_frames(
-                *(source, count, frames, places, statistic), lambda row: say(f"frame {row} of {count}", row), unit
-            )
+            tell = lambda row: say(f"frame {row} of {count}", row)  # noqa: E731
+            columns = importing.reduce_frames(source, count, frames, places, tell, unit)
         if log_path:
             text = importing.merge_into_log(log_path, stamps, interval, offset, columns)
         else:

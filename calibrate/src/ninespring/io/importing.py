@@ -293,12 +293,10 @@ def reduce_frames(
     count: int,
     frames: Iterator[np.ndarray],
     regions: list[Region],
-    statistic: str = "mean",
     say: Callable[[int], None] = lambda row: None,
     unit: str = "degC",
 ) -> dict[str, np.ndarray]:
-    """Return {t{k}_c: (frames,)} of a frame sequence in `unit`, a region a spring; `statistic` mean, median, max."""
-    reduce = {"mean": np.mean, "median": np.median, "max": np.max}[statistic]
+    """Return {t{k}_c: (frames,)} of a frame sequence in `unit`, the mean of a region a spring."""
     out = np.full((count, len(regions)), np.nan)
     for row, frame in enumerate(frames):
         height, width = frame.shape
@@ -312,7 +310,7 @@ def reduce_frames(
             pixels = frame[one.top : one.bottom, one.left : one.right]
             good = pixels[np.isfinite(pixels)]
             if good.size:
-                out[row, k] = reduce(good)
+                out[row, k] = good.mean()
         say(row + 1)
     factor, offset = UNITS[unit]
     out = out * factor + offset

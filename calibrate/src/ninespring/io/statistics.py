@@ -5,6 +5,7 @@ Nothing here knows what a spring is.
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from collections.abc import Sequence
 
@@ -83,18 +84,15 @@ def _near_and_apart(series: np.ndarray, starts: Sequence[int]) -> tuple[np.ndarr
 
 def _third_differences(series: np.ndarray, starts: Sequence[int], stride: int) -> np.ndarray:
     """Return the white noise of each column by its values so many rows apart."""
-    rows, columns = series.shape
-    bounds = [*starts, rows]
-    out = np.full(columns, np.nan)
-    for k in range(columns):
-        pieces = []
-        for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
-            a, b, c, d = (series[begin + j * stride : end - (3 - j) * stride, k] for j in range(4))
+    out = []
+    for column in series.T:
+        pieces = [column[:0]]
+        for begin, end in itertools.pairwise([*starts, len(column)]):
             if end - begin > 3 * stride:
+                a, b, c, d = (column[begin + j * stride : end - (3 - j) * stride] for j in range(4))
                 pieces.append(d - 3 * c + 3 * b - a)
-        if pieces:
-            out[k] = clipped_std(np.concatenate(pieces)) / np.sqrt(20.0)
-    return out
+        out.append(clipped_std(np.concatenate(pieces)) / np.sqrt(20.0))
+    return np.array(out)
 
 
 def autocorrelation(series: Sequence[np.ndarray], lags: int) -> np.ndarray:
@@ -168,15 +166,8 @@ def structure(
         with np.errstate(invalid="ignore", divide="ignore"):
             left = (1.0 + 2.0 * shared_noise(run, begins) * (few - 1.0) / few) / few
             excess = np.where(count > 0, mean**2 - left, np.nan)
-        weight = np.where(np.isfinite(excess), count, 0.0)
-        total = weight.sum(axis=0)
-        out.append(
-            np.where(
-                total > 0,
-                np.nansum(np.where(weight > 0, excess, 0.0) * weight, axis=0) / np.maximum(total, 1),
-                np.nan,
-            )
-        )
+            weight = np.where(np.isfinite(excess), count, 0.0)
+            out.append(np.nansum(excess * weight, axis=0) / weight.sum(axis=0))
     return np.asarray(out)
 
 

@@ -134,32 +134,24 @@ def mask_bad_sensors(run: Run) -> None:
     """Saturated and dead sensors are not measurements: masked, and said."""
     noise = np.nan_to_num(noise_floor(run.temperature_c))
     for k in range(run.springs):
-        values = run.temperature_c[:, k]
-        seen = np.flatnonzero(np.isfinite(values))
+        seen = np.flatnonzero(np.isfinite(run.temperature_c[:, k]))
         if seen.size < 10:
             continue
-        measured = values[seen]
-        if np.all(measured == measured[0]) and np.ptp(run.drive.sum(axis=1)) > 0:
-            others = [
-                np.nanmax(run.temperature_c[:, j]) - np.nanmin(run.temperature_c[:, j])
-                for j in range(run.springs)
-                if j != k and np.isfinite(run.temperature_c[:, j]).any()
-            ]
-            if np.ptp(run.drive[:, k]) > 0 or (others and max(others) > 5.0):
+        measured = run.temperature_c[seen, k]
+        begins, lengths = _stands(measured)
+        if len(lengths) == 1 and np.ptp(run.drive.sum(axis=1)) > 0:
+            others = np.delete(run.temperature_c, k, axis=1)
+            moved = [np.ptp(one[np.isfinite(one)]) for one in others.T if np.isfinite(one).any()]
+            if np.ptp(run.drive[:, k]) > 0 or max(moved, default=0.0) > 5.0:
                 run.temperature_c[:, k] = np.nan
                 run.notes.append(f"t{k + 1}_c never moves ({measured[0]:g} degC): dead sensor, left out")
                 continue
         for edge, extreme in (("highest", measured.max()), ("lowest", measured.min())):
-            flat = measured == extreme
-            longest = _longest_run(flat)
-            typical = _longest_run(np.diff(measured) == 0) + 1
-            inner = measured[~flat]
-            if inner.size < 10:
-                continue
+            longest, inner = lengths[measured[begins] == extreme].max(), measured[measured != extreme]
+            elsewhere = _stands(inner)[1].max(initial=0)
             # Ordinary quantisation also repeats values; a clipped sensor stays at ITS extreme far longer
             # than it ever stays at any other value.
-            elsewhere = _longest_run(np.diff(inner) == 0) + 1
-            if longest >= 15 and longest > 4 * elsewhere and longest >= typical:
+            if inner.size >= 10 and longest >= 15 and longest > 4 * elsewhere:
                 # near the limit only what the noise carried down is seen: those rows would pull the fit
                 run.temperature_c[seen[np.abs(measured - extreme) <= 4.0 * noise[k]], k] = np.nan
                 run.notes.append(
@@ -169,32 +161,29 @@ def mask_bad_sensors(run: Run) -> None:
         _mask_frozen(run, k)
 
 
+def _stands(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return at which of some values a new one begins, and for how many of them it stays."""
+    begins = np.flatnonzero(np.diff(values, prepend=np.nan) != 0)
+    return begins, np.diff(begins, append=len(values))
+
+
 def _mask_frozen(run: Run, k: int) -> None:
     """A sensor that goes on showing one value after its spring's drive has changed, far longer than it ever shows another."""
     seen = np.flatnonzero(np.isfinite(run.temperature_c[:, k]))
-    measured = run.temperature_c[seen, k]
-    bounds = np.concatenate(([0], np.flatnonzero(np.diff(measured) != 0) + 1, [len(measured)]))
-    lengths = np.diff(bounds)
+    begins, lengths = _stands(run.temperature_c[seen, k])
     if len(lengths) < 2:
         return
     longest = int(np.argmax(lengths))
-    begin, end = int(bounds[longest]), int(bounds[longest + 1])
-    moved = np.flatnonzero(np.diff(run.drive[seen[begin:end], k]) != 0)
-    since = end - begin - int(moved[0]) if moved.size else 0
-    elsewhere = int(np.delete(lengths, longest).max())
-    if since >= 30 and since > 4 * elsewhere:
-        run.temperature_c[seen[begin + 1 : end], k] = np.nan
+    rows = seen[begins[longest] :][: lengths[longest]]
+    moved = np.flatnonzero(np.diff(run.drive[rows, k]) != 0)
+    since = len(rows) - int(moved[0]) if moved.size else 0
+    if since >= 30 and since > 4 * np.delete(lengths, longest).max():
+        shown = run.temperature_c[rows[0], k]
+        run.temperature_c[rows[1:], k] = np.nan
         run.notes.append(
-            f"t{k + 1}_c shows {measured[begin]:g} degC from {run.time_s[seen[begin]]:g} to {run.time_s[seen[end - 1]]:g} s "
+            f"t{k + 1}_c shows {shown:g} degC from {run.time_s[rows[0]]:g} to {run.time_s[rows[-1]]:g} s "
             "whatever its spring is given: frozen, those rows left out"
         )
-
-
-def _longest_run(flags: np.ndarray) -> int:
-    if not flags.any():
-        return 0
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
-    return int((edges[1::2] - edges[::2]).max())
 
 
 def mend_placeholders(run: Run) -> None:
@@ -266,8 +255,10 @@ def find_gaps(run: Run) -> None:
     limit = max(10.0, 5.0 * usual)
     gaps = np.flatnonzero(step > limit)
     for row in gaps:
-        run.starts.append(int(row) + 1)
-        mask_run_in(run, int(row) + 1)
+        begin = int(row) + 1
+        run.starts.append(begin)
+        forgotten = np.searchsorted(run.time_s, run.time_s[begin] + RUN_IN_S)
+        run.temperature_c[begin + 1 : forgotten] = np.nan
     if gaps.size:
         longest = float(step[gaps].max())
         run.notes.append(
@@ -280,9 +271,3 @@ def find_gaps(run: Run) -> None:
             f"about {missing} rows are missing here and there: an input that changed meanwhile is taken for the old one "
             "until the next row"
         )
-
-
-def mask_run_in(run: Run, begin: int) -> None:
-    """Leave out what is measured while a simulation that starts at row `begin` forgets how it started."""
-    end = int(np.searchsorted(run.time_s, run.time_s[begin] + RUN_IN_S))
-    run.temperature_c[begin + 1 : end] = np.nan
