@@ -1,4 +1,4 @@
-"""The report's pictures, as SVG text."""
+"""The report's pictures, as SVG."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import matplotlib
 matplotlib.use("svg")
 import matplotlib.pyplot as plt
 import numpy as np
+from markupsafe import Markup
 
 from ..find.diagnosis import Diagnosis
 from ..infer.fit import Fit
@@ -23,20 +24,20 @@ plt.rcParams.update(
 )
 
 
-def as_svg(figure: Any) -> str:
-    """Return a figure as SVG text that stands in a page; it is closed."""
+def as_svg(figure: Any) -> Markup:
+    """Return a figure as SVG that stands in a page; it is closed."""
     out = io.StringIO()
     figure.savefig(out, format="svg", bbox_inches="tight")
     plt.close(figure)
     text = out.getvalue()
-    return text[text.index("<svg") :]
+    return Markup(text[text.index("<svg") :])
 
 
 def _thin(n: int, most: int = 500) -> slice:
     return slice(None, None, max(1, n // most))
 
 
-def traces(found: Diagnosis) -> list[tuple[str, str]]:
+def traces(found: Diagnosis) -> list[tuple[Markup, Markup]]:
     """Return two figures a run: temperatures, and what the models leave of them."""
     array = found.problem.array
     fits = ((found.baseline, BEFORE, "model before"), (found.final, AFTER, "model after"))
@@ -122,7 +123,7 @@ def _in_noise(found: Diagnosis, fit: Fit) -> list[np.ndarray]:
     return [left / noise for left, noise in zip(fit.residual, found.problem.noise, strict=True)]
 
 
-def array_map(found: Diagnosis) -> str:
+def array_map(found: Diagnosis) -> Markup:
     """Draw what is left at each spring in multiples of its sensor's noise, with a colour bar."""
     shape = (found.problem.array.rows, found.problem.array.cols)
     rms = np.sqrt(statistics.mean_there(np.concatenate(_in_noise(found, found.final)) ** 2, 0))
@@ -158,7 +159,7 @@ def unknown_heat(found: Diagnosis) -> str:
     return as_svg(figure)
 
 
-def maps(found: Diagnosis) -> str:
+def maps(found: Diagnosis) -> Markup:
     """Draw where the error sits: rms and mean of each spring, before and after."""
     problem = found.problem
     shape = (problem.array.rows, problem.array.cols)
@@ -176,7 +177,7 @@ def maps(found: Diagnosis) -> str:
     return as_svg(figure)
 
 
-def autocorrelation(found: Diagnosis) -> str:
+def autocorrelation(found: Diagnosis) -> Markup:
     """Draw what is left: its autocorrelation and its distribution."""
     problem = found.problem
     lags = min(120, problem.longest_lag())

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
-from markupsafe import Markup
 
 from ..find import search
 from ..find.diagnosis import Diagnosis
@@ -20,8 +19,6 @@ from . import figures
 
 HEADER = ("effect", "its one number", "error, K", "left one out, K", "what speaks against it")
 """Of `candidate_rows`."""
-MOST_TRIED = 14
-"""Of the models fitted on the way, so many are listed."""
 
 
 def render(template: str, **said: Any) -> str:
@@ -157,13 +154,6 @@ def files_of(folder: Path, told: results.Told, page: str, model: Model) -> dict[
 def html_report(found: Diagnosis, folder: str = "diagnosis") -> str:
     """Return the report as HTML; `folder` is where the diagnosis is written."""
     told = found.told
-    drawn = {
-        "array_map": figures.array_map(found),
-        "maps": figures.maps(found),
-        "unknown_heat": figures.unknown_heat(found),
-        "autocorrelation": figures.autocorrelation(found),
-    }
-    traces = [(Markup(svg), Markup(left)) for svg, left in figures.traces(found)]
     return render(
         "diagnosis.html",
         title="Ninespring diagnosis",
@@ -172,20 +162,10 @@ def html_report(found: Diagnosis, folder: str = "diagnosis") -> str:
         findings=findings(told),
         cut_short=cut_short(told.warnings),
         next_steps=next_steps(told, folder),
-        figures={name: Markup(svg) for name, svg in drawn.items()},
-        runs=list(zip(found.problem.runs, traces, strict=True)),
+        found=found,
+        figures=figures,
         numbers={name: one for effect in told.effects for name, one in effect.parameters.items()},
         undetermined=_undetermined(told),
-        tried=[
-            (
-                " + ".join(one.effects),
-                f"{one.rmse_c:.3f}",
-                f"{one.evidence_over_baseline:+.0f}",
-                "adopted" if one.adopted else "",
-            )
-            for one in told.candidates
-            if one.effects
-        ][:MOST_TRIED],
         least_gain=search.MIN_GAIN,
         least_evidence=search.MIN_EVIDENCE,
         known=list(effects.IN_WORDS),

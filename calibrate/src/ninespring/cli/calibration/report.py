@@ -51,7 +51,7 @@ def page(progress: Progress, array: Array) -> str:
         drives=drives,
         header=["", *NAMES[: len(shown)]],
         rows=[[label, *(form.format(one[key]).rstrip("%") for one in shown)] for label, key, form in MEASURES],
-        figure=Markup(_picture(progress, array, shown)) if shown else None,
+        figure=_picture(progress, array, shown) if shown else None,
         faults=[fault for one in drives for fault in one["faults"]],
         diagnosis=DIAGNOSIS,
         verified=error_rows(*errors) if errors else None,
@@ -66,7 +66,7 @@ def page(progress: Progress, array: Array) -> str:
     )
 
 
-def _picture(progress: Progress, array: Array, shown: Sequence[dict[str, Any]]) -> str:
+def _picture(progress: Progress, array: Array, shown: Sequence[dict[str, Any]]) -> Markup:
     """Draw the worst and the best known spring and one that is off, measured and believed, a panel a drive."""
     runs = [read_log(progress.folder / one["log"], array.springs) for one in shown]
     thought = [believed(run) for run in runs]
