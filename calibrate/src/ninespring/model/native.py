@@ -35,6 +35,15 @@ _double_p = ctypes.POINTER(ctypes.c_double)
 _int_p = ctypes.POINTER(ctypes.c_int)
 
 
+class _Doubles:
+    """How an array of doubles, or none, goes to the C code."""
+
+    @staticmethod
+    def from_param(array: np.ndarray | None) -> object:
+        """Return where its numbers stand."""
+        return None if array is None else array.ctypes.data_as(_double_p)
+
+
 NOT_IN_TIME = -6
 """Status of a plant that is not settled in so long."""
 
@@ -90,7 +99,7 @@ def library() -> ctypes.CDLL:
     except OSError as error:
         raise RuntimeError(f"the compiled part of ninespring is missing ({error}): run `pip install .`") from None
     pointer, integer, size = ctypes.c_void_p, ctypes.c_int, ctypes.c_size_t
-    real, text = ctypes.c_double, ctypes.c_char_p
+    real, text, message = ctypes.c_double, ctypes.c_char_p, (ctypes.c_char_p, ctypes.c_size_t)
     signatures: dict[str, tuple[object, Sequence[object]]] = {
         "plant_parameter_count": (size, ()),
         "plant_parameter": (ctypes.POINTER(structure(PlantParameter)), (size,)),
@@ -111,12 +120,22 @@ def library() -> ctypes.CDLL:
         "plant_set_ambient": (integer, (pointer, real)),
         "plant_step": (integer, (pointer, real)),
         "plant_settle": (integer, (pointer, real)),
-        "plant_simulate": (integer, (pointer, size, _double_p, _int_p, *(_double_p,) * 5)),
+        "plant_simulate": (integer, (pointer, size, _Doubles, _int_p, *(_Doubles,) * 5)),
         "plant_temperature_c": (real, (pointer, integer)),
         "plant_measured_c": (real, (pointer, integer)),
         "plant_austenite": (real, (pointer, integer)),
         "plant_resistance_ohm": (real, (pointer, integer)),
-        "plant_readings": (integer, (pointer, size, *(_double_p,) * 6)),
+        "plant_readings": (integer, (pointer, size, *(_Doubles,) * 6)),
+        "chip_export": (integer, (pointer, *(integer,) * 4, *message, *message)),
+        "chip_simulate": (integer, (text, integer, integer, size, _Doubles, integer, *(_Doubles,) * 7, *message)),
+        "chip_drive": (integer, (pointer, text, _int_p, size, size, _Doubles, _Doubles, *message)),
+        "chip_run": (
+            integer,
+            (
+                *(pointer, integer, integer, ctypes.POINTER(text), _int_p, real, ctypes.c_uint64, size, size),
+                *(*(_Doubles,) * 4, _int_p, *message),
+            ),
+        ),
         "paper_configure": (integer, (pointer, real)),
         "whiten": (real, (size, size, _double_p, text, _double_p, _double_p, size, _double_p, _double_p)),
         "weigh": (real, (size, _double_p, _double_p, text, _double_p, size, _double_p, _double_p, _double_p)),
@@ -142,9 +161,7 @@ def effect_names() -> tuple[str, ...]:
     return tuple(lib.plant_effect_name(k).decode() for k in range(lib.plant_effect_count()))
 
 
-def doubles(array: np.ndarray | None) -> object:
-    """Return where the doubles of an array stand, as the C code takes them."""
-    return None if array is None else array.ctypes.data_as(_double_p)
+doubles = _Doubles.from_param
 
 
 def _shaped(name: str, given: npt.ArrayLike, shape: tuple[int, ...]) -> np.ndarray:
@@ -318,8 +335,7 @@ class Plant:
         """Run a whole log; return what a board would read of each spring as v / i, (rows, springs), ohm."""
         log = _log(self.springs, time_s, power_w, fan, ambient_c)
         ohm, temperature = np.empty_like(log[1]), np.empty_like(log[1])
-        pointers = [doubles(one) for one in (*log, ohm, temperature)]
-        self._check(self._lib.plant_readings(self._plant, len(log[0]), *pointers), "readings")
+        self._check(self._lib.plant_readings(self._plant, len(log[0]), *log, ohm, temperature), "readings")
         return ohm
 
     def trace(
@@ -361,18 +377,16 @@ class Plant:
         rows, n = drive.shape
         modes = (ctypes.c_int * n)(*([mode] * n))
         out = np.empty((rows, n))
-        pointers = [doubles(time_s), modes, *(doubles(one) for one in (drive, fan, ambient_c))]
-        shown = (None, doubles(out)) if true_c else (doubles(out), None)
-        self._check(self._lib.plant_simulate(self._plant, rows, *pointers, *shown), "simulation")
+        shown = (None, out) if true_c else (out, None)
+        status = self._lib.plant_simulate(self._plant, rows, time_s, modes, drive, fan, ambient_c, *shown)
+        self._check(status, "simulation")
         return out
 
 
 def _chip(refusal: str, function: str, *arguments: object) -> str:
     """Call a function of the chip, all of which end with room for a message; return that, or raise it behind `refusal`."""
     message = ctypes.create_string_buffer(1024)
-    call = getattr(library(), function)
-    call.restype = ctypes.c_int
-    if call(*arguments, message, ctypes.c_size_t(len(message))):
+    if getattr(library(), function)(*arguments, message, len(message)):
         raise WorkError(f"{refusal} {message.value.decode()}")
     return message.value.decode()
 
@@ -400,14 +414,8 @@ def chip_export(plant: Plant, part: Part | None = None) -> tuple[str, str]:
     if min(row, col, rows - 1, cols - 1) < 0 or row + rows > plant.layers * plant.rows or col + cols > plant.cols:
         raise ValueError(f"part is {part}, the plant has {plant.layers * plant.rows} rows and {plant.cols} columns")
     text = ctypes.create_string_buffer(16384)
-    left_out = _chip(
-        "the model does not fit the chip:",
-        "chip_export",
-        ctypes.c_void_p(plant._plant),
-        *(row, col, rows, cols),
-        text,
-        ctypes.c_size_t(len(text)),
-    )
+    where = plant._plant, row, col, rows, cols
+    left_out = _chip("the model does not fit the chip:", "chip_export", *where, text, len(text))
     return text.value.decode(), left_out
 
 
@@ -430,16 +438,8 @@ def chip_simulate(
     times, drive, *along = _log(springs, time_s, drive, fan, ambient_c)
     power, first = _shaped("command_power_w", command_power_w, (springs,)), _shaped("first_c", first_c, (springs,))
     temperature, austenite = np.empty_like(drive), np.empty_like(drive)
-    _chip(
-        "the chip refuses",
-        "chip_simulate",
-        lines.encode(),
-        *shape,
-        ctypes.c_size_t(len(times)),
-        doubles(times),
-        mode,
-        *(doubles(one) for one in (drive, power, *along, first, temperature, austenite)),
-    )
+    given = times, mode, drive, power, *along, first
+    _chip("the chip refuses", "chip_simulate", lines.encode(), *shape, len(times), *given, temperature, austenite)
     return temperature, austenite
 
 
@@ -451,17 +451,8 @@ def chip_drive(
     The pattern is on for `on_rows` seconds of `rows`. Return true temperatures (degC) and austenite, (rows, springs).
     """
     temperature, austenite = np.empty((rows, plant.springs)), np.empty((rows, plant.springs))
-    _chip(
-        "the chip refuses",
-        "chip_drive",
-        ctypes.c_void_p(plant._plant),
-        lines.encode(),
-        _switches(pattern, plant.springs),
-        ctypes.c_size_t(rows),
-        ctypes.c_size_t(on_rows),
-        doubles(temperature),
-        doubles(austenite),
-    )
+    given = plant._plant, lines.encode(), _switches(pattern, plant.springs), rows, on_rows
+    _chip("the chip refuses", "chip_drive", *given, temperature, austenite)
     return temperature, austenite
 
 
@@ -487,20 +478,9 @@ def chip_run(
     temperature, austenite = np.empty((rows, plant.springs)), np.empty((rows, plant.springs))
     power, current = np.empty(rows), np.empty(rows)
     faults = ctypes.c_int()
-    _chip(
-        "the chip refuses",
-        "chip_run",
-        ctypes.c_void_p(plant._plant),
-        *board,
-        (ctypes.c_char_p * len(lines))(*(one.encode() for one in lines)),
-        _switches(pattern, plant.springs),
-        ctypes.c_double(fan),
-        ctypes.c_uint64(seed),
-        ctypes.c_size_t(rows),
-        ctypes.c_size_t(on_rows),
-        *(doubles(one) for one in (temperature, austenite, power, current)),
-        ctypes.byref(faults),
-    )
+    told = (ctypes.c_char_p * len(lines))(*(one.encode() for one in lines))
+    given = plant._plant, *board, told, _switches(pattern, plant.springs), fan, seed, rows, on_rows
+    _chip("the chip refuses", "chip_run", *given, temperature, austenite, power, current, ctypes.byref(faults))
     return temperature, austenite, power, current, faults.value
 
 
