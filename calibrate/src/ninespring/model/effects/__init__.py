@@ -9,7 +9,6 @@ from __future__ import annotations
 import functools
 import importlib
 import pkgutil
-from collections.abc import Mapping
 
 from ...io.results import Parameters
 from .. import native, tables
@@ -50,11 +49,5 @@ def candidates(scene: Scene) -> list[Candidate]:
     return [candidate for effect in library() for candidate in effect.candidates_for(scene)]
 
 
-def of_runs(scene: Scene) -> list[Candidate]:
-    """Return what may be a run's own, and not the array's, in logs."""
-    return runs_differ.candidates(scene)
-
-
-def of_springs(scene: Scene, apart: Mapping[str, float] | None = None) -> Candidate | None:
-    """Return how each spring may differ from what is the array's, None where there is one; as far as is known of each number."""
-    return spring_mismatch.each_its_own(scene, apart)
+of_runs = runs_differ.candidates
+of_springs = spring_mismatch.each_its_own

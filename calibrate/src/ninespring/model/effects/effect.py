@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from ...io.results import Parameters
 from .. import native
@@ -53,6 +54,11 @@ class Candidate:
                 value = max(value, out[one.key] * 0.05)
             out[one.key] = min(one.high, max(one.low, value))
         return out
+
+
+def one_number(number: Free, probe: float, variant: str = "", **more: Any) -> Candidate:
+    """Return a way to be there that has one number, probed at this value; `more`: what else a candidate says."""
+    return Candidate(variant, (number,), ({number.key: probe},), **more)
 
 
 @dataclass(frozen=True)

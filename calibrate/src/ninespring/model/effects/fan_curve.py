@@ -2,20 +2,14 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Scene, linear, says
+from .effect import Candidate, Effect, Scene, linear, one_number, says
 
 NAME = "fan_half_share"
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
     if scene.fan_between:
-        yield Candidate(
-            "",
-            (linear(NAME, 0.1, 0.9, 0.735, 0.05),),
-            ({NAME: 0.735},),
-            signed=True,
-            neutral=0.5,
-        )
+        yield one_number(linear(NAME, 0.1, 0.9, 0.735, 0.05), 0.735, signed=True, neutral=0.5)
 
 
 EFFECT = Effect(

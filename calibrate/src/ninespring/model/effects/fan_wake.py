@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Scene, Steady, linear, says
+from .effect import Candidate, Effect, Scene, Steady, linear, one_number, says
 
 NAME = "wake_w_per_k"
 
@@ -14,13 +14,8 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         (("east", scene.cols), ("south", scene.rows), ("west", scene.cols), ("north", scene.rows))
     ):
         if count > 1:
-            yield Candidate(
-                towards,
-                (linear(NAME, 0.0, 0.05, 1e-3, 1e-3),),
-                ({NAME: 1e-3},),
-                fixed=(("wake_direction", float(direction)),),
-                most=5.0,
-            )
+            fixed = (("wake_direction", float(direction)),)
+            yield one_number(linear(NAME, 0.0, 0.05, 1e-3, 1e-3), 1e-3, towards, fixed=fixed, most=5.0)
 
 
 EFFECT = Effect(

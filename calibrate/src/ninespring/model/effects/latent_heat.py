@@ -3,14 +3,14 @@
 from collections.abc import Iterator
 
 from . import alloy
-from .effect import Candidate, Effect, Numbers, Scene, Steady, linear, sized
+from .effect import Candidate, Effect, Numbers, Scene, Steady, linear, one_number, sized
 
 NAME = "latent_heat_j"
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
     if scene.transforms:
-        yield Candidate("", (linear(NAME, 0.0, 200.0, 5.0, 5.0),), ({NAME: 5.0},), most=6.0)
+        yield one_number(linear(NAME, 0.0, 200.0, 5.0, 5.0), 5.0, most=6.0)
     if places := alloy.places(scene):
         size = 16.0 * scene.declared("heat_capacity_j_per_k")  # as the paper's spring has it
         yield Candidate(

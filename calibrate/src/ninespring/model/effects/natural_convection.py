@@ -2,12 +2,11 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Scene, Steady, linear, says
+from .effect import Candidate, Effect, Scene, Steady, linear, one_number, says
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
-    name = "convection_exponent"
-    yield Candidate("", (linear(name, 0.0, 0.6, 0.2, 0.2),), ({name: 0.2},))
+    yield one_number(linear("convection_exponent", 0.0, 0.6, 0.2, 0.2), 0.2)
 
 
 EFFECT = Effect(

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from .effect import Candidate, Effect, Numbers, Scene, Steady, linear, positive, sized
+from .effect import Candidate, Effect, Numbers, Scene, Steady, linear, one_number, positive, sized
 
 SHARE, WIDTH, SHAPE, BEYOND = "optical_share", "optical_width", "optical_shape", "optical_beyond"
 WITH_ROOM = "neighbours, and the surroundings beyond the array"
@@ -20,13 +20,8 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
     distances = len({row**2 + col**2 for row in range(scene.rows) for col in range(scene.cols)} - {0})
     if distances == 1:
         for variant, beyond in (("neighbours", 0.0), (WITH_ROOM, 1.0)):
-            yield Candidate(
-                variant,
-                (linear(SHARE, 0.0, 0.8, 0.08, 0.08),),
-                ({SHARE: 0.08},),
-                most=6.0,
-                fixed=((WIDTH, NEAREST), (BEYOND, beyond)),
-            )
+            fixed = (WIDTH, NEAREST), (BEYOND, beyond)
+            yield one_number(linear(SHARE, 0.0, 0.8, 0.08, 0.08), 0.08, variant, most=6.0, fixed=fixed)
         return
     spread = (
         # one half to twice what it begins at, as soon as anything says otherwise: a small blur says little of its form

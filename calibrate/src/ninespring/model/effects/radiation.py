@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Scene, Steady, linear, says
+from .effect import Candidate, Effect, Scene, Steady, linear, one_number, says
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
-    yield Candidate("", (linear("emissivity", 0.0, 1.0, 0.4, 0.3),), ({"emissivity": 0.6},), most=1.7)
+    yield one_number(linear("emissivity", 0.0, 1.0, 0.4, 0.3), 0.6, most=1.7)
 
 
 EFFECT = Effect(

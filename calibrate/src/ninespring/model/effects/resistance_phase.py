@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from . import alloy
-from .effect import Candidate, Effect, Numbers, Scene, Steady, linear, sized
+from .effect import Candidate, Effect, Numbers, Scene, Steady, linear, one_number, sized
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
@@ -12,14 +12,8 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
     name, martensite = "resistance_austenite_ohm", scene.declared("resistance_martensite_ohm")
     number = linear(name, 0.5 * martensite, 2.0 * martensite, 1.2 * martensite, 0.2 * martensite)
     if scene.transforms:
-        yield Candidate(
-            "",
-            (number,),
-            ({name: 1.15 * martensite},),
-            signed=True,
-            neutral=martensite,
-            more_starts=({name: 0.85 * martensite}, {name: 1.25 * martensite}),
-        )
+        starts = {name: 0.85 * martensite}, {name: 1.25 * martensite}
+        yield one_number(number, 1.15 * martensite, signed=True, neutral=martensite, more_starts=starts)
     if places := alloy.places(scene):
         yield Candidate(
             alloy.VARIANT,

@@ -3,21 +3,15 @@
 from collections.abc import Iterator
 
 from ..spec import Free
-from .effect import Candidate, Effect, Numbers, Scene, sized
+from .effect import Candidate, Effect, Numbers, Scene, one_number, sized
 
 NAMES = ("resistance_martensite_rise_per_k", "resistance_austenite_rise_per_k")
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
     if "current" in scene.modes or scene.reads_ohm:
-        key = "resistance_rise_per_k"
-        yield Candidate(
-            "both phases alike",
-            (Free(key, 0.001, -0.003, 0.005, "1/K", NAMES, False, scale=0.001),),
-            ({key: 0.001},),
-            signed=True,
-            most=4.0,
-        )
+        number = Free("resistance_rise_per_k", 0.001, -0.003, 0.005, "1/K", NAMES, False, scale=0.001)
+        yield one_number(number, 0.001, "both phases alike", signed=True, most=4.0)
 
 
 def _says(numbers: Numbers, variant: str) -> str:

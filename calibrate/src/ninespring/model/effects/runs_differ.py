@@ -22,27 +22,14 @@ def _number(key: str, r: int) -> Free:
     return Free(run, 0.0, -20.0, 20.0, "K", run=r, prior=OFFSET_SPREAD_K)
 
 
-def _each_run(scene: Scene, key: str) -> Candidate:
+def _each_run(scene: Scene, key: str, shows: bool) -> Iterator[Candidate]:
+    if not shows:
+        return
     free = tuple(_number(key, r) for r in range(scene.runs))
     still, moved = (1.0, 1.05) if key == DRIVE_GAIN else (0.0, 1.0)
     probes = tuple({f.key: moved if f is one else still for f in free} for one in free)
     # flexible: what is the array's own, and the same in all runs, comes first
-    return Candidate("each run its own", free, probes, signed=True, most=10.0, neutral=still, flexible=True)
-
-
-def _drive(scene: Scene) -> Iterator[Candidate]:
-    if scene.runs > 1:  # the gain of all is in the heat capacity, the losses or the command's power
-        yield _each_run(scene, DRIVE_GAIN)
-
-
-def _ambient(scene: Scene) -> Iterator[Candidate]:
-    if scene.ambient_logged:
-        yield _each_run(scene, AMBIENT_OFFSET)
-
-
-def _sensor(scene: Scene) -> Iterator[Candidate]:
-    if scene.ambient_logged and scene.runs > 1:  # of one run it is `sensor_gain`'s offset
-        yield _each_run(scene, SENSOR_OFFSET)
+    yield Candidate("each run its own", free, probes, signed=True, most=10.0, neutral=still, flexible=True)
 
 
 def _gains(numbers: Numbers, variant: str) -> str:
@@ -67,9 +54,10 @@ def _off(number: tuple[float, float | None], more: str, less: str, name: str) ->
 
 
 EFFECTS = (
-    Effect(RUN_DRIVE, _drive, says=_gains),
-    Effect(RUN_AMBIENT, _ambient, says=_surroundings),
-    Effect(RUN_SENSOR, _sensor, says=_readings),
+    # the gain of all is in the heat capacity, the losses or the command's power; the offset of one run is `sensor_gain`'s
+    Effect(RUN_DRIVE, lambda one: _each_run(one, DRIVE_GAIN, one.runs > 1), says=_gains),
+    Effect(RUN_AMBIENT, lambda one: _each_run(one, AMBIENT_OFFSET, one.ambient_logged), says=_surroundings),
+    Effect(RUN_SENSOR, lambda one: _each_run(one, SENSOR_OFFSET, one.ambient_logged and one.runs > 1), says=_readings),
 )
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Scene, linear, says
+from .effect import Candidate, Effect, Scene, linear, one_number, says
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
@@ -12,14 +12,8 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
     total = max(1e-3, scene.declared("command_power_w")) * scene.springs
     size = 0.1 * scene.declared("supply_v") ** 2 / total
     for chopped, variant in enumerate(("loads that draw their mean", "chopped loads")):
-        yield Candidate(
-            variant,
-            (linear(name, 0.0, 100.0, size, size),),
-            ({name: size},),
-            fixed=(("supply_chopped", float(chopped)),),
-            most=6.0,
-            more_starts=({name: 0.3 * size},),
-        )
+        number, fixed = linear(name, 0.0, 100.0, size, size), (("supply_chopped", float(chopped)),)
+        yield one_number(number, size, variant, fixed=fixed, most=6.0, more_starts=({name: 0.3 * size},))
 
 
 EFFECT = Effect(

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from ..simulate import SHIFT_PER_N
-from .effect import Candidate, Effect, Numbers, Scene, linear, sized
+from .effect import Candidate, Effect, Numbers, Scene, linear, one_number, sized
 
 LOADED = "by the logged load"
 
@@ -13,26 +13,15 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
     if scene.hottest_c < scene.declared("austenite_start_c") - 45.0:
         return
     if scene.load_moves:
-        yield Candidate(
-            LOADED,
-            (linear(SHIFT_PER_N, -20.0, 20.0, 0.0, 1.0),),
-            ({SHIFT_PER_N: 2.0},),
-            signed=True,
-            most=8.0,
-            more_starts=({SHIFT_PER_N: 6.0}, {SHIFT_PER_N: -6.0}),
-        )
+        starts = {SHIFT_PER_N: 6.0}, {SHIFT_PER_N: -6.0}
+        number = linear(SHIFT_PER_N, -20.0, 20.0, 0.0, 1.0)
+        yield one_number(number, 2.0, LOADED, signed=True, most=8.0, more_starts=starts)
     if scene.springs < 2:
         return
     for k in range(1, scene.springs + 1):
         name = f"transformation_shift_k[{k}]"
-        yield Candidate(
-            f"spring {k}",
-            (linear(name, -40.0, 40.0, 0.0, 3.0),),
-            ({name: 3.0},),
-            signed=True,
-            most=5.0,
-            more_starts=({name: 10.0}, {name: -10.0}),
-        )
+        number, starts = linear(name, -40.0, 40.0, 0.0, 3.0), ({name: 10.0}, {name: -10.0})
+        yield one_number(number, 3.0, f"spring {k}", signed=True, most=5.0, more_starts=starts)
 
 
 def _says(numbers: Numbers, variant: str) -> str:
