@@ -152,28 +152,19 @@ class Board:
     def _greet(self) -> None:
         """Find out what is there: a board says `ninespring` to `version`."""
         until = time.monotonic() + self.patience * FOUND_WITHIN_S - 0.2
-        heard: list[str] = []
-        if self._port.resets_the_board:
-            line = self._wait(time.monotonic() + BOOTING_S)
-            heard += [line] if line else []
-        while (left := until - time.monotonic()) > 0:
+        heard = [self._wait(time.monotonic() + BOOTING_S) or ""] if self._port.resets_the_board else []
+        while not self.version and (left := until - time.monotonic()) > 0:
             self._port.write("\nversion\n")
             ends = time.monotonic() + min(self.patience, left)
-            while (line := self._wait(ends)) is not None:
+            while not self.version and (line := self._wait(ends)) is not None:
                 heard.append(line)
-                if line.startswith("ninespring "):
-                    self.version = [line]
-                    break
-            if self.version:
-                self._end_of_greeting()
-                return
-        shown = next((re.sub(r"[^ -~]", "?", line)[:40] for line in heard if line), "")
-        if shown:
+                self.version = [line] if line.startswith("ninespring ") else []
+        if not self.version and (said := next(filter(None, heard), "")):
+            shown = re.sub(r"[^ -~]", "?", said)[:40]
             raise WorkError(f"{self.port}: what is there is no Ninespring board: it says '{shown}'")
-        raise WorkError(f"{self.port}: silent at 115200 baud: is it the right port, does the board run Ninespring?")
-
-    def _end_of_greeting(self) -> None:
-        """Read the rest of the answer, and those to what was asked while the board was still starting."""
+        if not self.version:
+            raise WorkError(f"{self.port}: silent at 115200 baud: is it the right port, does the board run Ninespring?")
+        # the rest of the answer, and those to what was asked while the board was still starting
         sent = ("echo off", "telemetry off")  # a board that knows no echo refuses the first
         self._port.write("".join(f"{line}\n" for line in sent))
         quiet_s, answered = 0.2 * self.patience, False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -130,25 +131,17 @@ def _who_has(name: str) -> str:
     with suppress(OSError):
         for process in Path("/proc").glob("[0-9]*"):
             with suppress(OSError):
-                if int(process.name) == os.getpid() or not _has_open(process, port) or _serves(process, port):
-                    continue
-                return f" ({(process / 'comm').read_text().strip()}, pid {process.name})"
+                other = int(process.name) != os.getpid() and port in map(_target, (process / "fd").iterdir())
+                if other and not _serves(process, port):
+                    return f" ({(process / 'comm').read_text().strip()}, pid {process.name})"
     return ""
-
-
-def _has_open(process: Path, port: str) -> bool:
-    return any(_target(link) == port for link in (process / "fd").iterdir())
 
 
 def _serves(process: Path, port: str) -> bool:
     """Return whether a process has the server's end of a pseudo-terminal /dev/pts/N."""
-    number = Path(port).name
-    for link in (process / "fd").iterdir():
-        if _target(link).endswith("/ptmx"):
-            told = (process / "fdinfo" / link.name).read_text().split()
-            if "tty-index:" in told and told[told.index("tty-index:") + 1] == number:
-                return Path(port).parent == Path("/dev/pts")
-    return False
+    ends = (one for one in (process / "fd").iterdir() if _target(one).endswith("/ptmx"))
+    told = "".join((process / "fdinfo" / one.name).read_text() for one in ends)
+    return re.search(rf"^tty-index:\s*{Path(port).name}$", told, re.MULTILINE) is not None
 
 
 def _target(link: Path) -> str:

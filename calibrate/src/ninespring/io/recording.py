@@ -16,6 +16,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from .. import __version__
 from ..errors import InputError, RefusedError, WorkError
 from . import results
@@ -80,36 +82,6 @@ class Recording:
     faults: list[Fault] = field(default_factory=list)
     latched: list[str] = field(default_factory=list)
     """What the board still had when all was off, in its words."""
-
-
-class FaultWatch:
-    """Asks the board for its faults when telemetry shows that they have changed, and tells each new one."""
-
-    def __init__(self, board: Board, faults: list[Fault], alarm: Callable[[Fault], None]) -> None:
-        self._board, self._faults, self._alarm = board, faults, alarm
-        self.latched: set[str] = set()
-        """What the board said last."""
-        self._state = "ok"
-        self._time_s: float | None = None
-
-    def row(self, time_s: float, state: str) -> None:
-        """Take the time and the state of a row."""
-        changed, self._state, self._time_s = state != self._state, state, time_s
-        if changed:
-            self.ask()
-
-    def ask(self) -> None:
-        """Ask for what is latched now."""
-        self.take(self._board.ask("faults"), self._time_s)
-
-    def take(self, lines: Sequence[str], time_s: float | None) -> None:
-        """Take the answer to `faults`."""
-        for line in lines:
-            if line not in self.latched and (match := FAULT.fullmatch(line)):
-                fault = Fault(time_s, int(match[1]) if match[1] else None, int(match[2]), match[3])
-                self._faults.append(fault)
-                self._alarm(fault)
-        self.latched = set(lines)
 
 
 def script_lines(text: str, name: str, duration_s: float = math.inf) -> list[Step]:
@@ -274,15 +246,12 @@ class LogFile:
                 os.fsync(self._file)
         os.close(self._file)
         if self.part and self.rows:
-            self._give_name(self.part)
+            if self._force or not self.path.exists() or self.path.stat().st_size == 0:
+                os.replace(self.part, self.path)
+            else:  # it has come meanwhile
+                self.path = self.part
         elif self.part:
             self.part.unlink()
-
-    def _give_name(self, part: Path) -> None:
-        if self._force or not self.path.exists() or self.path.stat().st_size == 0:
-            os.replace(part, self.path)
-        else:  # it has come meanwhile
-            self.path = part
 
 
 @contextlib.contextmanager
@@ -327,29 +296,19 @@ def record(
     got = Recording()
     finer_hz = max(hz, min(FINER * hz, FINEST_HZ))
     sink = RowSink(log, thermometers, 1.0 / hz if finer_hz > hz else 0.0)
-
-    def note(fault: Fault) -> None:
-        sink.comment(f"fault {fault}")
-        alarm(fault)
-
-    def send(step: Step) -> None:
-        for words in step.send(board):
-            sink.comment(f"'{step.line}': {words}")
-            remark(f"'{step.line}': {words}")
-
-    watch = FaultWatch(board, got.faults, note)
+    under_way = _UnderWay(board, sink, got, alarm, remark)
     before: list[str] = []
     with switched_off_after(board, got):
         for step in steps:
             if step.at_s is None:
-                send(step)
+                under_way.send(step)
         board.guard(write_head(board, log, keys or {}))
         before = board.ask("faults")
-        _rows(board, finer_hz, duration_s, steps, got, say, sink, watch, send)
+        under_way.rows(finer_hz, duration_s, [step for step in steps if step.at_s is not None], say)
     with contextlib.suppress(WorkError):
         sink.flush()
-        watch.latched |= set(before)
-        watch.take(got.latched, None)
+        under_way.latched |= set(before)
+        under_way.take_faults(got.latched, None)
     if got.faults:
         more = f" and {len(got.faults) - 1} more" if len(got.faults) > 1 else ""
         got.ended = f"a fault cut this run short, {got.faults[0]}{more}" + (f"; {got.ended}" if got.ended else "")
@@ -363,6 +322,67 @@ def record(
             log.write(f"# dropped_lines: {got.dropped}")
         write_end(log, got)
     return got
+
+
+@dataclass
+class _UnderWay:
+    """A recording under way: rows and remarks go to the log, steps to the board, new faults and remarks to whoever listens."""
+
+    board: Board
+    sink: RowSink
+    got: Recording
+    alarm: Callable[[Fault], None]
+    remark: Callable[[str], None]
+    latched: set[str] = field(default_factory=set)
+    """The faults that the board told of last, in its words."""
+
+    def send(self, step: Step) -> None:
+        """Send a step's line."""
+        for words in step.send(self.board):
+            self.sink.comment(f"'{step.line}': {words}")
+            self.remark(f"'{step.line}': {words}")
+
+    def take_faults(self, lines: Sequence[str], time_s: float | None) -> None:
+        """Take the answer to `faults`, and tell those that are new."""
+        for line in lines:
+            if line not in self.latched and (match := FAULT.fullmatch(line)):
+                fault = Fault(time_s, int(match[1]) if match[1] else None, int(match[2]), match[3])
+                self.got.faults.append(fault)
+                self.sink.comment(f"fault {fault}")
+                self.alarm(fault)
+        self.latched = set(lines)
+
+    def rows(self, hz: int, duration_s: float, steps: list[Step], say: Callable[[int, float], None]) -> None:
+        """Take rows for so long, each step sent in its time; the board is asked for its faults where a row's state has changed."""
+        names = self.board.telemetry(hz)
+        self.sink.begin(names)
+        check = RowCheck(names, hz)
+        state, time_s, first_s = "ok", None, math.nan
+        while True:
+            line = self.board.next_line(time.monotonic() + SILENT_S)
+            if line is None:
+                raise WorkError(f"{self.board.port}: no telemetry for {SILENT_S:g} s")
+            if COMMENT.fullmatch(line):
+                self.sink.comment(line)
+                if SWITCHED_OFF in line:
+                    self.take_faults(self.board.ask("faults"), time_s)
+                continue
+            good = check.feed(line) if line else []
+            self.got.dropped = check.dropped
+            if check.restarted:
+                raise WorkError("the board has started again")
+            for row in good:
+                first_s = row.time_s if math.isnan(first_s) else first_s
+                if row.time_s - first_s > duration_s:
+                    return
+                self.sink.row(row)
+                before, time_s = state, row.time_s
+                state = dict(zip(names, row.text.split(","), strict=True)).get("state", state)
+                if state != before:
+                    self.take_faults(self.board.ask("faults"), time_s)
+                say(self.sink.rows, time_s - first_s)
+                while steps and (steps[0].at_s or 0.0) <= time_s - first_s:
+                    self.send(steps.pop(0))
 
 
 class RowSink:
@@ -447,20 +467,20 @@ class RowSink:
 
 def mean_row(names: Sequence[str], first: str, rows: Sequence[str]) -> str:
     """Return the first row with the currents, voltages and fan that these rows mean; as it is where there are none."""
-    cells, out = [row.split(",") for row in rows], first.split(",")
-    for at, name in enumerate(names) if rows else ():
+    if not rows:
+        return first
+    out = dict(zip(names, first.split(","), strict=True))
+    columns = dict(zip(names, zip(*(row.split(",") for row in rows), strict=True), strict=True))
+    for name in names:
         if name == "fan":
-            out[at] = f"{sum(float(one[at]) for one in cells) / len(cells):.2f}"
-        if re.fullmatch(r"i\d+_a", name):
-            current = [float(one[at]) for one in cells]
-            out[at] = f"{sum(current) / len(cells):.4f}"
-            voltage_name = f"v{name[1:-2]}_v"
-            if voltage_name in names:
-                where = names.index(voltage_name)
-                voltage = [float(one[where]) for one in cells]
-                weight = current if sum(current) > 0 else [1.0] * len(cells)
-                out[where] = f"{sum(v * w for v, w in zip(voltage, weight, strict=True)) / sum(weight):.4f}"
-    return ",".join(out)
+            out[name] = f"{np.array(columns[name], float).mean():.2f}"
+        if match := re.fullmatch(r"i(\d+)_a", name):
+            current = np.array(columns[name], float)
+            out[name] = f"{current.mean():.4f}"
+            if (voltage := f"v{match[1]}_v") in out:
+                weights = current if current.sum() > 0 else None
+                out[voltage] = f"{np.average(np.array(columns[voltage], float), weights=weights):.4f}"
+    return ",".join(out.values())
 
 
 @contextlib.contextmanager
@@ -507,47 +527,3 @@ def write_end(log: LogFile, got: Recording) -> None:
         log.write(f"# ended: {got.ended}")
     for line in got.latched:
         log.write(f"# latched at the end: {line}")
-
-
-def _rows(
-    board: Board,
-    hz: int,
-    duration_s: float,
-    steps: Sequence[Step],
-    got: Recording,
-    say: Callable[[int, float], None],
-    sink: RowSink,
-    watch: FaultWatch,
-    send: Callable[[Step], None],
-) -> None:
-    waiting = [step for step in steps if step.at_s is not None]
-    names = board.telemetry(hz)
-    sink.begin(names)
-    check = RowCheck(names, hz)
-    state = names.index("state") if "state" in names else None
-    first_s = math.nan
-    while True:
-        line = board.next_line(time.monotonic() + SILENT_S)
-        if line is None:
-            raise WorkError(f"{board.port}: no telemetry for {SILENT_S:g} s")
-        if not line:
-            continue
-        if COMMENT.fullmatch(line):
-            sink.comment(line)
-            if SWITCHED_OFF in line:
-                watch.ask()
-            continue
-        good = check.feed(line)
-        got.dropped = check.dropped
-        if check.restarted:
-            raise WorkError("the board has started again")
-        for row in good:
-            first_s = row.time_s if math.isnan(first_s) else first_s
-            if row.time_s - first_s > duration_s:
-                return
-            sink.row(row)
-            if state is not None:
-                watch.row(row.time_s, row.text.split(",")[state])
-            say(sink.rows, row.time_s - first_s)
-            while waiting and (waiting[0].at_s or 0.0) <= row.time_s - first_s:
-                send(waiting.pop(0))

@@ -45,17 +45,10 @@ def simulated_board(more: Sequence[str] = ()) -> tuple[subprocess.Popen[str], st
 
     In a session of its own: Ctrl-C in the terminal ends this program first, which switches the springs off.
     """
-    elf = os.environ.get("NINESPRING_AVR_DIR")
-    words = [
-        str(simulator()),
-        "board",
-        "--thermometers",
-        "pty",
-        "--set",
-        NITI,
-        *(("--elf", str(Path(elf) / "firmware.elf")) if elf else ()),
-        *more,
-    ]
+    words = [str(simulator()), "board", "--thermometers", "pty", "--set", NITI]
+    if elf := os.environ.get("NINESPRING_AVR_DIR"):
+        words += ["--elf", str(Path(elf) / "firmware.elf")]
+    words += more
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
     assert process.stdout is not None and process.stderr is not None
     port = process.stdout.readline().strip()

@@ -28,50 +28,37 @@ def record_tape(
     The board begins anew: what it knows of its springs it forgets, but for what it has learnt of them. Steps without a time
     are sent when the tape has begun. Whatever ends it, the springs are off afterwards.
     """
-    got = Recording()
+    got, steps = Recording(), list(steps)
+    last, lost, lost_s, time_s = None, 0, 0.0, 0.0
     with switched_off_after(board, got):
         board.guard(write_head(board, log, keys or {}))
         try:
             board.ask("telemetry inputs", 10.0)
         except RefusedError as error:
             raise WorkError(f"{error}; a tape begins with all springs off and no fault") from None
-        got.ended = _ticks(board, log, duration_s, list(steps), say, remark)
+        while time_s < duration_s:
+            line = board.next_line(time.monotonic() + board.patience * SILENT_S)
+            if line is None:
+                raise WorkError(f"{board.port}: nothing came for {board.patience * SILENT_S:g} s")
+            if line.startswith("~S"):
+                tick = int(line[2:6], 16)
+                if last is not None and tick != (last + 1) % COUNTED:
+                    lost_s = lost_s if lost else TICK_S * log.rows
+                    lost += (tick - last - 1) % COUNTED
+                last = tick
+                log.write_row(line)
+            elif line.startswith("<"):
+                log.write(line)
+            time_s = TICK_S * log.rows
+            say(log.rows, time_s)
+            while log.rows and steps and (steps[0].at_s or 0.0) <= time_s < duration_s:
+                step = steps.pop(0)
+                for words in step.send(board):
+                    remark(f"'{step.line}': {words}")
+        if lost:
+            got.ended = (
+                f"{lost} ticks were lost on the way here, the first after {lost_s:.1f} s: the tape tells nothing of what "
+                "came after that"
+            )
     write_end(log, got)
     return got
-
-
-def _ticks(
-    board: Board,
-    log: LogFile,
-    duration_s: float,
-    steps: list[Step],
-    say: Callable[[int, float], None],
-    remark: Callable[[str], None],
-) -> str:
-    """Return what is missing, in words."""
-    last, lost, lost_s = None, 0, 0.0
-    while True:
-        line = board.next_line(time.monotonic() + board.patience * SILENT_S)
-        if line is None:
-            raise WorkError(f"{board.port}: nothing came for {board.patience * SILENT_S:g} s")
-        if line.startswith("~S"):
-            tick = int(line[2:6], 16)
-            if last is not None and tick != (last + 1) % COUNTED:
-                lost_s = lost_s if lost else TICK_S * log.rows
-                lost += (tick - last - 1) % COUNTED
-            last = tick
-            log.write_row(line)
-        elif line.startswith("<"):
-            log.write(line)
-        time_s = TICK_S * log.rows
-        say(log.rows, time_s)
-        if time_s >= duration_s:
-            return (
-                f"{lost} ticks were lost on the way here, the first after {lost_s:.1f} s: the tape tells nothing of what came after that"
-                if lost
-                else ""
-            )
-        while log.rows and steps and (steps[0].at_s or 0.0) <= time_s:
-            step = steps.pop(0)
-            for words in step.send(board):
-                remark(f"'{step.line}': {words}")

@@ -8,13 +8,13 @@ by the same step each time is a clock, no temperature does that; the other colum
 
 from __future__ import annotations
 
+import math
 import re
 import statistics
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, nullcontext
 
 from ..errors import WorkError
 from .logs import LIMITS, number_in
@@ -29,8 +29,6 @@ SEPARATOR = re.compile(r"[,;\t ]+")
 SPRING = re.compile(r"t(?:c|emp\w*)?[ _]?(\d+)(?:_c)?", re.IGNORECASE)
 KEPT = 4096
 """Readings that wait for their rows, at most."""
-PACED = 64
-"""Rows over which the board's pace is taken."""
 
 
 class Lines:
@@ -105,8 +103,6 @@ class Thermometers:
         """Board's time less the logger's, each time that a reading came."""
         self._board: tuple[float, float, float] | None = None
         """Last row: board's time, time of its arrival, time between rows."""
-        self._rows: deque[tuple[float, float]] = deque(maxlen=PACED)
-        """Board's time and time of arrival of the rows that tell its pace: a simulated board may run faster than the clock."""
         self._closing = threading.Event()
         self.trouble = ""
         """Why nothing more comes."""
@@ -145,32 +141,26 @@ class Thermometers:
                 now = time.monotonic()
                 stamp, values = (now if got[0] is None else got[0]), got[1]
                 with self._lock:
-                    if self._readings and stamp <= self._readings[-1][0]:
-                        if stamp < self._readings[-1][0]:  # its clock began anew
-                            self._readings.clear()
-                            self._offsets.clear()
-                        else:
-                            continue
+                    last = self._readings[-1][0] if self._readings else -math.inf
+                    if stamp == last:
+                        continue
+                    if stamp < last:  # its clock began anew
+                        self._readings.clear()
+                        self._offsets.clear()
                     self._readings.append((stamp, values))
                     if self._board:
                         at_s, came_s, period_s = self._board
-                        self._offsets.append(at_s + min(self._pace() * (now - came_s), period_s) - stamp)
+                        self._offsets.append(at_s + min(now - came_s, period_s) - stamp)
                 self.latest = self.latest | values
                 self.count += 1
         except WorkError as error:
             self.trouble = str(error)
-
-    def _pace(self) -> float:
-        """Return the board's seconds in a second."""
-        (first_s, began), (last_s, ended) = self._rows[0], self._rows[-1]
-        return (last_s - first_s) / (ended - began) if ended > began else 1.0
 
     def row_came(self, board_s: float) -> None:
         """Take note of the board's clock: a row of that time came just now."""
         now = time.monotonic()
         with self._lock:
             period = board_s - self._board[0] if self._board else 0.0
-            self._rows.append((board_s, now))
             self._board = (board_s, now, period)
 
     def at(self, board_s: float) -> dict[int, float] | None:
@@ -197,11 +187,6 @@ class Thermometers:
         self._port.close()
 
 
-@contextmanager
-def measuring(port: str | None) -> Iterator[Thermometers | None]:
-    """Yield a logger's thermometers while they are needed; None where no port is given."""
-    if not port:
-        yield None
-    else:
-        with closing(Thermometers(port)) as thermometers:
-            yield thermometers
+def measuring(port: str | None) -> AbstractContextManager[Thermometers | None]:
+    """Return a logger's thermometers for as long as they are needed; None where no port is given."""
+    return closing(Thermometers(port)) if port else nullcontext()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -38,11 +39,7 @@ def condense(run: Run, max_rows: int = 4000) -> Run:
 
 def _evenly(run: Run, each: int) -> np.ndarray:
     """Return the rows at which a new one begins, so many by so many from each start."""
-    return np.concatenate([np.arange(a, b, each) for a, b in _pieces(run)])
-
-
-def _pieces(run: Run) -> list[tuple[int, int]]:
-    return list(zip(run.starts, [*run.starts[1:], len(run.time_s)], strict=True))
+    return np.concatenate([np.arange(a, b, each) for a, b in itertools.pairwise([*run.starts, len(run.time_s)])])
 
 
 def _happens(run: Run) -> np.ndarray:

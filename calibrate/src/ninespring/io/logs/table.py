@@ -37,7 +37,9 @@ class Table:
         """What `# key: value` lines said above the header."""
         self.faults: list[str] = []
         """What a recorder wrote of the board's faults when they came."""
-        text = self._text()
+        text = read_text(self.path)
+        if not text.strip():
+            raise self.refuse("the file is empty")
         self._ended = text.endswith("\n")
         kept, numbers = self._kept(text)
         self.header_line = numbers[0]
@@ -73,26 +75,14 @@ class Table:
             raise self.refuse("there is a header but no row", self.header_line)
         for row, line in enumerate(body):
             if (found := line.count(",") + 1) != cells:
-                advice = (
-                    "cut off here?"
-                    if row == len(body) - 1
-                    else DECIMAL_COMMA
-                    if found > cells
-                    else "a cell is missing: leave it empty between two commas"
-                )
+                missing = "a cell is missing: leave it empty between two commas"
+                advice = "cut off here?" if row == len(body) - 1 else DECIMAL_COMMA if found > cells else missing
                 message = f"{found} cells where the header has {cells}: {advice}"
                 raise self.refuse(message, self._numbers[row], len(line) + 1)
         self.lines = np.asarray(self._numbers[: len(body)], dtype=np.int64)
         words = {name for name in self.names if name == "state" or name.startswith("note_")} | set(text_columns)
         self.frame = self._frame(words)
         return self
-
-    def _text(self) -> str:
-        """Return the file's text; an empty one is refused."""
-        text = read_text(self.path)
-        if not text.strip():
-            raise self.refuse("the file is empty")
-        return text
 
     def _kept(self, text: str) -> tuple[list[str], list[int]]:
         """Return the header and the rows, and the line of each; keep what the comments say."""

@@ -6,11 +6,11 @@ import hashlib
 import json
 import os
 import re
-import sys
-import tempfile
+import secrets
 from collections.abc import Mapping
 from pathlib import Path
 
+import click
 import numpy as np
 import pandas as pd
 
@@ -103,9 +103,7 @@ def write_atomically(files: Mapping[Path, str | bytes], force: bool = False) -> 
     output; both last, when nothing else can fail. WorkError with the file's name where the disk is full.
     """
     check_folder(*files, force=force)
-    umask = os.umask(0)
-    os.umask(umask)
-    made: list[tuple[str, Path]] = []
+    made: list[tuple[Path, Path]] = []
     whole = {path: text.encode() if isinstance(text, str) else text for path, text in files.items()}
     streams = {path: data for path, data in whole.items() if str(path) == STANDARD_OUTPUT or _is_device(path)}
     at: Path | None = None
@@ -116,30 +114,24 @@ def write_atomically(files: Mapping[Path, str | bytes], force: bool = False) -> 
             if not force:
                 _refuse_to_lose(path, data)
             at, target = path, Path(os.path.realpath(path))
-            handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+            temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
             made.append((temporary, target))
-            with os.fdopen(handle, "wb") as stream:
+            with temporary.open("xb") as stream:
                 stream.write(data)
-            os.chmod(temporary, 0o666 & ~umask)
         while made:
             at = made[0][1]
             os.replace(*made[0])
             made.pop(0)
         for at, data in streams.items():
-            if str(at) != STANDARD_OUTPUT:
-                with at.open("wb") as stream:
-                    stream.write(data)
-            elif hasattr(sys.stdout, "buffer"):
-                sys.stdout.flush()
-                sys.stdout.buffer.write(data)
-                sys.stdout.flush()
+            if str(at) == STANDARD_OUTPUT:
+                click.echo(data.decode(), nl=False)
             else:
-                sys.stdout.write(data.decode())
+                at.write_bytes(data)
     except OSError as error:
         raise WorkError(f"{at}: cannot be written: {error.strerror}") from None
     finally:
         for temporary, _ in made:
-            os.unlink(temporary)
+            temporary.unlink(missing_ok=True)
 
 
 def read_bytes(path: str | Path) -> bytes:
