@@ -33,6 +33,12 @@ class WorkError(Exception):
     """The input was right but the work failed (a port went away, a fit cannot be done). Exit code 1."""
 
 
+def in_words(error: BaseException) -> str:
+    """Return what a user is told of an error: what is none of these is a defect of the tool."""
+    known = isinstance(error, InputError | WorkError)
+    return str(error) if known else f"a defect of the tool: {type(error).__name__}: {error}"
+
+
 class RefusedError(WorkError):
     """The board answered that it does not do what it was asked to: it is there, and goes on.
 

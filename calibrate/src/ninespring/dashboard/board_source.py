@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, RefusedError, WorkError
+from ..errors import InputError, RefusedError, WorkError, in_words
 from ..io import words
 from ..io.belief import beliefs
 from ..io.board import PATIENCE, SIMULATED, Board, reading, shape_of, springs_in
@@ -34,12 +34,19 @@ ENDS_PLAYING = frozenset({"clear", "unlock", "cold", "end_play"})
 """What ends the list that is played, beside all that switches a spring."""
 
 
-@dataclass(frozen=True)
+UNKNOWN = dict.fromkeys(("bounds_c", "phase", "unknown_s", "target_a", "measured_c"))
+UNKNOWN |= {"level": 0, "doing": "", "limits": (), "cut_a": 0.0, "sights": 0}
+"""What is shown of each spring before anything is known of it."""
+
+
+@dataclass
 class Play:
-    """A list of patterns that is played in turn, and when it began (monotonic)."""
+    """A list of patterns that is played in turn: which is on, and when the next one is due (monotonic)."""
 
     patterns: list[str]
     seconds: float
+    at: int = -1
+    next_s: float = 0.0
 
 
 class OffFirst(Board):
@@ -81,9 +88,6 @@ class BoardSource(Source):
         self._sink: RowSink | None = None
         self._check: RowCheck | None = None
         self._play: Play | None = None
-        self._played: Play | None = None
-        """That of which the next pattern and its time are known."""
-        self._play_at, self._play_next_s = 0, 0.0
         if port == SIMULATED:
             self.off_within_s *= PATIENCE
         self._change(name="simulated board" if port == SIMULATED else port, recording=None, said="")
@@ -193,10 +197,8 @@ class BoardSource(Source):
                             self._thermometers = None
             except KeyboardInterrupt:
                 break
-            except WorkError as error:
-                trouble = str(error)
             except Exception as error:
-                trouble = f"a defect of the tool: {type(error).__name__}: {error}"
+                trouble = in_words(error)
             self._play = None
             self._drop("the board went away")
             if found:
@@ -233,18 +235,9 @@ class BoardSource(Source):
             rows=rows,
             cols=columns,
             springs=springs,
-            level=[0] * springs,
-            bounds_c=[None] * springs,
-            phase=[None] * springs,
-            doing=[""] * springs,
-            unknown_s=[None] * springs,
             every_s=1.0 / self._hz,
-            target_a=[None] * springs,
-            limits=[[] for _ in range(springs)],
-            cut_a=[0.0] * springs,
-            measured_c=[None] * springs,
-            sights=[0] * springs,
             faults=[],
+            **{name: [empty] * springs for name, empty in UNKNOWN.items()},
         )
         self._board = board
         heard_s = look_s = time.monotonic()
@@ -283,19 +276,15 @@ class BoardSource(Source):
     def _obey(self, board: Board, wish: dict[str, Any], answer: Future[str]) -> None:
         """Carry out a wish. Whatever is wrong with it ends it alone; only a board that is silent or gone ends more."""
         try:
-            said = self._carry_out(board, wish)
-        except (RefusedError, InputError) as error:
+            answer.set_result(self._carry_out(board, wish))
+        except (WorkError, InputError) as error:
             answer.set_exception(error)
-        except WorkError as error:
-            answer.set_exception(error)
-            raise  # no answer: look for the board anew
-        except Exception as error:
-            answer.set_exception(WorkError(f"a defect of the tool: {type(error).__name__}: {error}"))
+            if not isinstance(error, RefusedError | InputError):
+                raise  # no answer: look for the board anew
         except BaseException as error:
-            answer.set_exception(WorkError(str(error)))
-            raise
-        else:
-            answer.set_result(said)
+            answer.set_exception(WorkError(in_words(error)))
+            if not isinstance(error, Exception):
+                raise
 
     def _carry_out(self, board: Board, wish: dict[str, Any]) -> str:
         do = wish["do"]
@@ -344,19 +333,16 @@ class BoardSource(Source):
 
     def _play_on(self, board: Board, now: float) -> None:
         play = self._play
-        if play is not self._played:
-            self._played, self._play_at, self._play_next_s = play, 0, now
-            if not play:
-                self._change(play=None)
-        if not play or now < self._play_next_s:
+        if not play and self._state.get("play"):
+            self._change(play=None)
+        if not play or now < play.next_s:
             return
-        at = self._play_at % len(play.patterns)
-        self._play_at, self._play_next_s = at + 1, now + play.seconds
+        play.at, play.next_s = (play.at + 1) % len(play.patterns), now + play.seconds
         try:
-            line = f"pattern {play.patterns[at]}"
+            line = f"pattern {play.patterns[play.at]}"
             board.ask(line)
             self._note(board, line)
-            self._change(play={"patterns": play.patterns, "seconds": play.seconds, "at": at})
+            self._change(play={"patterns": play.patterns, "seconds": play.seconds, "at": play.at})
         except WorkError as error:
             if self._play is play:
                 self._play = None
@@ -409,24 +395,18 @@ class BoardSource(Source):
             with self._recording():
                 self._log_row(row)
             now = reading(dict(zip(self._names, row.text.split(","), strict=True)))
-            values: dict[str, Any] = {
-                "time_s": now.time_s,
-                "current_a": plain(now.current_a),
-                "voltage_v": plain(now.voltage_v),
-                "power_w": plain(now.current_a * now.voltage_v),
-                "temperature_c": plain(now.temperature_c),
-                "duty": plain(now.duty),
-                "fan": now.fan,
-                "ambient_c": now.ambient_c,
-                "state": now.state,
-                "state_words": words.of_state(now.state),
-                "sum_a": float(now.current_a.sum()),
-                "supply_limit_a": float(limit) if (limit := self._settings.get("supply_limit_a")) else None,
-                "corrupt": self._check.dropped,
-                "measured_c": self._measured(len(now.current_a)),
-            }
+            measured = self._thermometers.latest if self._thermometers else {}
             self._row_at_s = time.monotonic()
-            self._change(**values)
+            self._change(
+                **{name: getattr(now, name) for name in ("time_s", "fan", "ambient_c", "state")},
+                **{name: plain(getattr(now, name)) for name in ("current_a", "voltage_v", "temperature_c", "duty")},
+                power_w=plain(now.current_a * now.voltage_v),
+                state_words=words.of_state(now.state),
+                sum_a=float(now.current_a.sum()),
+                supply_limit_a=float(limit) if (limit := self._settings.get("supply_limit_a")) else None,
+                corrupt=self._check.dropped,
+                measured_c=[measured.get(k) for k in range(1, len(now.current_a) + 1)],
+            )
             bounds = [one or (None, None) for one in self._state["bounds_c"]]
             self._remember(self._state | {"low_c": [low for low, _ in bounds], "high_c": [high for _, high in bounds]})
         if self._check.restarted:
@@ -453,10 +433,6 @@ class BoardSource(Source):
             self._end_recording(str(error))
             raise
         return str(path)
-
-    def _measured(self, springs: int) -> list[float | None]:
-        latest = self._thermometers.latest if self._thermometers else {}
-        return [latest.get(k) for k in range(1, springs + 1)]
 
     def _log_row(self, row: Row) -> None:
         if self._sink:

@@ -24,7 +24,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from ..errors import InputError, WorkError
+from ..errors import InputError, WorkError, in_words
 from . import wishes
 from .source import Source
 
@@ -212,12 +212,10 @@ async def _answer(source: Source, text: str, rate: _Rate, answers: asyncio.Queue
     try:
         said = await _carry_out(source, wish, rate, answers)
         answer = {"kind": "done", "id": number, "said": said}
-    except (WorkError, InputError) as error:
-        answer = {"kind": "refused", "id": number, "why": str(error)}
     except TimeoutError:
         answer = {"kind": "refused", "id": number, "why": f"the board does not answer for {ANSWER_S:g} s"}
     except Exception as error:
-        answer = {"kind": "refused", "id": number, "why": f"a defect of the tool: {type(error).__name__}: {error}"}
+        answer = {"kind": "refused", "id": number, "why": in_words(error)}
     with contextlib.suppress(asyncio.QueueFull):
         answers.put_nowait(answer)
 

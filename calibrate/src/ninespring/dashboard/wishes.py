@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import json
 import re
 import typing
@@ -56,20 +55,17 @@ WISHES: dict[str, dict[str, Any]] = {
 """Everything that a page may wish, exactly, and what goes with it; what is not one of these changes nothing."""
 
 
-@functools.cache
-def _kind(do: str) -> type[msgspec.Struct]:
-    return msgspec.defstruct(do, [("do", str), *WISHES[do].items(), ("id", Any, None)], forbid_unknown_fields=True)
-
-
-def _no_number(text: str) -> float:
-    raise ValueError(text)
+_KINDS = {
+    do: msgspec.defstruct(do, [("do", str), *own.items(), ("id", Any, None)], forbid_unknown_fields=True)
+    for do, own in WISHES.items()
+}
 
 
 def read(text: str) -> tuple[int | None, dict[str, Any]]:
     """Return what came as a wish's id and its JSON object, not validated yet: so also a refusal finds its way."""
     try:
-        wish = json.loads(text, parse_constant=_no_number)
-    except (ValueError, RecursionError):
+        wish = msgspec.json.decode(text)
+    except (msgspec.DecodeError, RecursionError):
         wish = None
     if not isinstance(wish, dict):
         return None, {}
@@ -83,7 +79,7 @@ def validated(wish: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(do, str) or do not in WISHES:
         raise InputError("not a wish that this page can have")
     try:
-        msgspec.convert(wish, _kind(do))
+        msgspec.convert(wish, _KINDS[do])
     except msgspec.ValidationError as error:
         where = re.search(r"`\$\.(\w+)", str(error))
         if not where:
