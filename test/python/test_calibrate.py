@@ -15,8 +15,7 @@ from fake_board import FakeBoard
 from made import ELF, SIM, needs_board
 from ninespring.cli.calibrate import FROM
 from ninespring.cli.calibration import chain, judged
-from ninespring.cli.calibration.chain import Calibration
-from ninespring.cli.calibration.cut import left_of
+from ninespring.cli.calibration.chain import Calibration, left_of
 from ninespring.cli.calibration.progress import Progress
 from ninespring.errors import InputError, WorkError
 from ninespring.io.board import Board

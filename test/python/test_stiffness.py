@@ -16,8 +16,7 @@ from ninespring.explore.spec import read_spec
 from ninespring.infer.predict import plant_of
 from ninespring.io.logs import read_log
 from ninespring.model import native, stiffness
-from ninespring.model.models import Array, Model, model_of_layer, model_text, read_array, read_model
-from ninespring.model.pattern import pattern_of
+from ninespring.model.models import Array, Model, model_of_layer, model_text, pattern_of, read_array, read_model
 from ninespring.model.simulate import array_parameters
 from ninespring.say import plotting
 

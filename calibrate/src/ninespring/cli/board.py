@@ -117,16 +117,16 @@ def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: 
     if settings is None:
         with working("giving back"), Board(port, off_at_end=False) as board:
             last = history.undo(board, save)
-        write({json_path: results.checked(results.Upload(settings=len(last.sent), saved=save, undone=last.by))})
-        for line in last.words(back=True):
-            out.print(line)
-        out.print(f"`{last.by}` of {last.when} is taken back{', saved' if save else ''}")
-        return
-    given = read_settings(settings)
-    with working("sending", len(given)) as say:
-        history.send(port, given, f"upload {settings.name}", save, say)
-    write({json_path: results.checked(results.Upload(settings=len(given), saved=save))})
-    out.print(f"{len(given)} settings sent and read back{', saved' if save else ''}")
+        result = results.Upload(settings=len(last.sent), saved=save, undone=last.by)
+        said = [*last.words(back=True), f"`{last.by}` of {last.when} is taken back"]
+    else:
+        given = read_settings(settings)
+        with working("sending", len(given)) as say:
+            history.send(port, given, f"upload {settings.name}", save, say)
+        result = results.Upload(settings=len(given), saved=save)
+        said = [f"{len(given)} settings sent and read back"]
+    write({json_path: results.checked(result)})
+    out.print("\n".join(said) + (", saved" if save else ""))
 
 
 @command("""\b

@@ -12,8 +12,7 @@ from ..export.drive import patterns
 from ..io import ranges
 from ..io.board import SIMULATED, Board
 from ..io.logs import write_atomically
-from ..model.models import Array, read_array
-from ..model.pattern import pattern_of
+from ..model.models import Array, pattern_of, read_array
 from .calibration.chain import Calibration
 from .calibration.progress import FILE, Progress
 from .calibration.report import page

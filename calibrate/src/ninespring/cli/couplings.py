@@ -55,43 +55,25 @@ def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None)
     with working("meshing") as say:
         found = find(array, mesh, say)
     shown = Table("number", "value", "reduction", "mesh", "unit")
-    seen: set[str] = set()
+    numbers: dict[str, results.Coupling] = {}
     for full, one in _parameters(found).items():
-        name = _found(full)
-        if name in found.lumped.reduction and name not in seen:
-            seen.add(name)
-            shown.add_row(
-                name,
-                f"{one.value:.4g}",
-                f"{one.reduction_error:.1g}",
-                f"{one.mesh_error or 0.0:.1g}",
-                one.unit,
-            )
+        numbers.setdefault(_found(full), one)
+    for name, one in numbers.items():
+        if name in found.lumped.reduction:
+            errors = f"{one.reduction_error:.1g}", f"{one.mesh_error or 0.0:.1g}"
+            shown.add_row(name, f"{one.value:.4g}", *errors, one.unit)
     talk = beside(output)
     talk.print(shown)
-    spring, part = found.geometry.spring, found.geometry
-    lines = [
-        f"a coil of {spring.coil_mm:g} mm, {spring.spacing_mm:.3g} mm from turn to turn, conducts into the air like a "
-        f"cylinder of {2 * spring.radius_mm:.3g} mm",
-        f"between springs two apart, from the field: {1e3 * found.pairs.second:.3f} mW/K"
-        + (f", blown {1e3 * found.pairs_blown.second:.3f}" if found.pairs_blown else ""),
-        f"network against field, random drive, 15 min: {100 * found.drive_error:.1f} % of the rise, rms",
-        f"field: {part.rows} x {part.cols} springs, {found.still.unknowns} unknowns; heat in less heat out "
+    talk.print(
+        f"network against field, random drive, 15 min: {100 * found.drive_error:.1f} % of the rise, rms\n"
+        f"field: {found.still.unknowns} unknowns; heat in less heat out "
         f"{100 * max(found.still.balance, found.blown.balance if found.blown else 0.0):.1g} %",
-    ]
-    if part.below:
-        lines.insert(
-            1,
-            f"[stiffness] springs: {part.below.spring.spacing_mm:.3g} mm from turn to turn, like a cylinder of "
-            f"{2 * part.below.spring.radius_mm:.3g} mm; between the two of a taxel, from the field: "
-            f"{1e3 * found.pairs.series:.3f} mW/K",
-        )
-    for line in lines:
-        talk.print(line, soft_wrap=True)
+        soft_wrap=True,
+    )
     result = results.Couplings(
         mesh=mesh,
         unknowns=found.still.unknowns,
-        cylinder_diameter_mm=2 * spring.radius_mm,
+        cylinder_diameter_mm=2 * found.geometry.spring.radius_mm,
         drive_error=found.drive_error,
         balance_error=found.still.balance,
         second_w_per_k=found.pairs.second,

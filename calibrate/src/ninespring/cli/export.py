@@ -15,7 +15,7 @@ from ..io.board import Board, as_lines, read_settings
 from ..io.logs import check_folder, read_bytes
 from ..model.models import Model, model_of_layer, read_model
 from ..model.stiffness import LAYERS
-from ..say.verified import with_verification
+from ..say.page import with_verification
 from .console import (
     FILE,
     JSON,

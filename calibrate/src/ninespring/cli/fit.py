@@ -79,8 +79,8 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
         model, suspect = doubt.model_of_fit(problem, chosen, runs)
     before, after = rms(base.residual), rms(chosen.residual)
     model.provenance["rmse_before_c"] = before
-    result = _result(problem, chosen, runs, suspect)
-    result.rmse_before_c, result.rmse_c, result.holdout_rmse_c, result.noise_c = before, after, held, problem.noise_c
+    errors = {"rmse_before_c": before, "rmse_c": after, "holdout_rmse_c": held, "noise_c": problem.noise_c}
+    result = _result(problem, chosen, runs, suspect, errors)
     notes("", suspect)
     _write(model, result, output, json_path)
     model.name = "model.toml" if str(output) == "-" else str(output)
@@ -89,17 +89,16 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
         beside(output).print(f"{effect}: not for the chip: {why}")
 
 
-def _result(problem: Problem, found: Fit, runs: list[Run], warnings: list[str]) -> results.Fit:
-    """Return a fit's numbers, each with the interval in which it lies in 95 of 100 cases; errors are still open."""
+def _result(
+    problem: Problem, found: Fit, runs: list[Run], warnings: list[str], errors: dict[str, float]
+) -> results.Fit:
+    """Return a fit's numbers, each with the interval in which it lies in 95 of 100 cases, and its errors."""
     numbers = {k: v for e in (None, *found.spec.effects) for k, v in parameters_of(problem, found, e).items()}
     for name, ends in intervals(found).items():
         numbers[name].interval_95 = ends
     return results.Fit(
         logs=logs_of(runs),
-        rmse_before_c=None,
-        rmse_c=None,
-        holdout_rmse_c=None,
-        noise_c=None,
+        **dict.fromkeys(("rmse_before_c", "rmse_c", "holdout_rmse_c", "noise_c")) | errors,
         effects=list(found.spec.effects),
         parameters=numbers,
         correlations=[results.Correlation(a=a, b=b, correlation=value) for a, b, value in correlations(found)],
@@ -126,9 +125,8 @@ def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path:
         problem, found, first = from_resistance.fit(array, runs)
         found, witnesses = board_alone.with_effects(problem, found, say)
     model = from_resistance.model_of_fit(problem, found)
-    result = _result(problem, found, runs, [from_resistance.SCALE])
-    result.rmse_before_v, result.rmse_v = 1e-3 * rms(first.residual), 1e-3 * rms(found.residual)
-    result.noise_v = 1e-3 * problem.noise_c
+    errors = {"rmse_before_v": rms(first.residual), "rmse_v": rms(found.residual), "noise_v": problem.noise_c}
+    result = _result(problem, found, runs, [from_resistance.SCALE], {name: 1e-3 * one for name, one in errors.items()})
     _write(model, result, output, json_path)
     beside(output).print(
         f"no thermometer: fitted to v / i, error {1e3 * result.rmse_before_v:.1f} mV as declared, "

@@ -8,8 +8,7 @@ import click
 
 from ..errors import InputError
 from ..io import ranges
-from ..model.models import Model, read_model
-from ..model.pattern import pattern_of
+from ..model.models import Model, pattern_of, read_model
 from ..model.simulate import array_parameters, board_settings
 from .console import MODEL, beside, command, number, output, write
 

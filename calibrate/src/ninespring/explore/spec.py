@@ -20,8 +20,7 @@ from ..errors import InputError
 from ..io.logs import read_text
 from ..io.toml_file import TomlFile, did_you_mean
 from ..model import cooling, native, stiffness
-from ..model.models import MATERIAL_KEYS, SPRING_KEYS, STIFFNESS_KEYS, Array
-from ..model.pattern import pattern_of
+from ..model.models import MATERIAL_KEYS, SPRING_KEYS, STIFFNESS_KEYS, Array, pattern_of
 from .geometry import geometry_of
 
 METHODS = ("grid", "latin", "sobol", "saltelli", "optimise")

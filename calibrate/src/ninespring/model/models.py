@@ -158,28 +158,19 @@ def model_of_layer(model: Model, layer: str) -> Model:
     if which and scale != 1.0:  # what the model does not say, and the plant has
         table = native.parameter_table()
         values = {name: one.default for name, one in table.items() if name.startswith(COUPLED)} | values
-    for each in (False, True):  # what is said of one spring is over what is said of all
-        for full, value in values.items():
-            name, _, spring = full.partition("[")
-            if name.startswith(("series_", "stiffness_")) or bool(spring) != each:
-                continue
-            scaled = scale if which and name.startswith(COUPLED) else 1.0
-            at = int(spring[:-1]) - 1 - which * n if spring else -1
-            if spring and not 0 <= at < n:
-                continue
-            to = f"{name}[{at + 1}]" if spring else name
-            out.parameters[to] = scaled * value
+    for name in dict.fromkeys(full.partition("[")[0] for full in values):
+        if name.startswith(("series_", "stiffness_")):
+            continue
+        scaled = scale if which and name.startswith(COUPLED) else 1.0
+        own = {f"{name}[{k + 1}]": f"{name}[{which * n + k + 1}]" for k in range(n)}
+        said = {values.get(full) for full in own.values()}
+        if None not in said and len(said) == 1:  # all the same: said once
+            own = {name: own[f"{name}[1]"]}
+        for to, full in ({name: name} | own).items():
+            if full in values:
+                out.parameters[to] = scaled * values[full]
             if full in model.stderr:
                 out.stderr[to] = scaled * model.stderr[full]
-    for name in {full.partition("[")[0] for full in out.parameters if "[" in full}:
-        values = [out.parameters.get(f"{name}[{k + 1}]") for k in range(n)]
-        if values[0] is not None and len(set(values)) == 1:  # all the same: said once
-            errors = [out.stderr.pop(f"{name}[{k + 1}]", None) for k in range(n)]
-            for k in range(n):
-                del out.parameters[f"{name}[{k + 1}]"]
-            out.parameters[name] = values[0]
-            if errors[0] is not None:
-                out.stderr[name] = errors[0]
     return out
 
 
@@ -324,3 +315,22 @@ def array_of(array: Array | None, runs: Sequence[Run]) -> Array:
             )
         array = Array(*SHAPES[count], stiffness=below)
     return array
+
+
+def pattern_of(text: str, array: Array) -> list[bool]:
+    """Return which springs a pattern has on (`111101111`, of two layers `111101111/000010000`), elongation first; refused as `ninespring-sim` refuses it."""
+    parts = text.split("/")
+    if len(parts) != array.layers:
+        if array.layers == 1:
+            raise InputError(f"pattern '{text}' is of {len(parts)} layers, the array has one")
+        raise InputError(
+            f"pattern '{text}' is of {len(parts)} layer{'s' * (len(parts) > 1)}, the array has two; "
+            f"write elongation/stiffness, with {array.springs // 2} digits each"
+        )
+    for part, layer in zip(parts, stiffness.LAYERS, strict=False):
+        where = f"{layer} " if array.layers == 2 else ""
+        if set(part) - {"0", "1"}:
+            raise InputError(f"{where}pattern '{part}' holds something else than 0 and 1")
+        if len(part) != array.rows * array.cols:
+            raise InputError(f"{where}pattern has {len(part)} digits for {array.rows * array.cols} springs")
+    return [one == "1" for part in parts for one in part]

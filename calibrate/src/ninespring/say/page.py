@@ -19,14 +19,11 @@ from . import figures
 
 HEADER = ("effect", "its one number", "error, K", "left one out, K", "what speaks against it")
 """Of `candidate_rows`."""
+BEGIN, END = "<!-- verified -->", "<!-- /verified -->"
 
 
 def render(template: str, **said: Any) -> str:
     """Return a page or a part of one (templates/); text is escaped, what is Markup stands as it is."""
-    return _pages().get_template(template).render(said)
-
-
-def _pages() -> jinja2.Environment:
     pages = jinja2.Environment(
         loader=jinja2.PackageLoader("ninespring.say"),
         autoescape=lambda name: not str(name).endswith(".css"),
@@ -35,7 +32,7 @@ def _pages() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     pages.filters["number_rows"] = number_rows
-    return pages
+    return pages.get_template(template).render(said)
 
 
 def number_rows(parameters: results.Parameters) -> list[tuple[str, ...]]:
@@ -212,3 +209,23 @@ def with_unit(one: results.Number) -> str:
     """Return a fitted number in words: value, standard error, unit."""
     error = "" if one.stderr is None else f" +- {one.stderr:.2g}"
     return f"{one.value:.4g}{error}{'' if one.unit in ('', '1') else f' {one.unit}'}"
+
+
+def error_rows(before: results.ChipError, after: results.ChipError) -> list[tuple[str, str, str]]:
+    """Return the chip's error before and after, of all springs and of each, as rows of text."""
+    pairs = zip(before.rmse_per_spring_c, after.rmse_per_spring_c, strict=True)
+    rows = [("all springs", before.rmse_c, after.rmse_c), *((f"spring {k}", *one) for k, one in enumerate(pairs, 1))]
+    cell = lambda value: "–" if value is None else f"{value:.2f}"  # noqa: E731
+    return [(name, cell(a), cell(b)) for name, a, b in rows]
+
+
+def with_verification(page: str, verified: results.Verify) -> str:
+    """Return a report with the chip's error before and after in it; what an earlier verification said is replaced."""
+    log = verified.logs[0]
+    bad = [f"{log.file}: {note}" for note in cut_short(log.notes)]
+    rows = error_rows(verified.before, verified.after)
+    section = BEGIN + render("verified.html", log=log, cut_short=bad, rows=rows) + END
+    bare = re.sub(f"{BEGIN}.*?{END}", "", page, flags=re.S)
+    at = bare.find("<h2")
+    at = at if at >= 0 else bare.find("</main>")
+    return bare[:at] + section + bare[at:]

@@ -7,6 +7,7 @@ worse with them in simulation, and drove no worse with them when it was measured
 from __future__ import annotations
 
 import contextlib
+import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
@@ -30,7 +31,6 @@ from ...model.models import Array, Model, read_model
 from ...say import page
 from ..console import working
 from . import judged
-from .cut import left_of
 from .progress import Progress
 
 RUNS = ("run1", "run2")
@@ -46,6 +46,9 @@ PATTERN_AT_S = 5.0
 DRIVES = 2
 """So often a drive with new settings is looked at before it is called worse: `upload` has the board forget what it had learnt,
 and in the first it lets every spring cool until it loses its phase, to find out where that is."""
+SOON_S = 1.0
+"""What was on is on again so long after the first row."""
+ONE = re.compile(r"(on|off) (\d+|all)(?: (\d+))?")
 
 Ask = Callable[[str], bool]
 Tell = Callable[[str, str], None]
@@ -447,3 +450,25 @@ def _words(how: str, found: dict[str, float], faults: Sequence[Any]) -> str:
         f"hottest {found['hottest_c']:.0f} degC"
     )
     return said + (f"; {faults[0]}" if faults else "")
+
+
+def left_of(steps: Sequence[Step], from_s: float, springs: int) -> list[Step]:
+    """Return the steps that are left after `from_s` seconds of a plan; first, what was on then is switched on again."""
+    if from_s <= 0.0:
+        return list(steps)
+    level, fan = ["0"] * springs, "0"
+    head, after = [step for step in steps if step.at_s is None], []
+    for step in steps:
+        if step.at_s is None:
+            continue
+        if step.at_s > from_s:
+            after.append(Step(step.line, step.at_s - from_s + SOON_S))
+        elif match := ONE.fullmatch(step.line):
+            value = "0" if match[1] == "off" else match[3] or "100"
+            which = range(springs) if match[2] == "all" else [int(match[2]) - 1]
+            for k in which:
+                level[k] = value
+        elif step.line.startswith("fan "):
+            fan = step.line.split()[1]
+    again = [Step(f"on {k + 1} {value}", SOON_S) for k, value in enumerate(level) if value != "0"]
+    return [*head, *([Step(f"fan {fan}", SOON_S)] if fan != "0" else []), *again, *after]

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("svg")
 import matplotlib.pyplot as plt
 import numpy as np
 from markupsafe import Markup
@@ -16,9 +13,8 @@ from ...io import results
 from ...io.logs import read_log
 from ...model.models import Array
 from ...say.figures import AFTER, BEFORE, INK, MEASURED, as_svg
-from ...say.page import render
+from ...say.page import error_rows, render
 from ...say.plotting import believed
-from ...say.verified import error_rows
 from .chain import DIAGNOSIS, OLD_SETTINGS, SETTINGS
 from .progress import Progress
 
