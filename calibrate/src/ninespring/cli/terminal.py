@@ -7,8 +7,8 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 
 import click
 from prompt_toolkit import PromptSession
@@ -120,13 +120,13 @@ class Talk:
     def __init__(self, board: Board, show: Callable[[str], None]) -> None:
         self._board, self._show = board, show
         self._lock = threading.Lock()
-        self._ends = threading.Event()
+        self.ends = threading.Event()
         self.trouble = ""
         self.refused = 0
 
     def listen(self) -> None:
-        """Print telemetry and status lines as they come, until `end`."""
-        while not self._ends.is_set():
+        """Print telemetry and status lines as they come, until `ends`."""
+        while not self.ends.is_set():
             try:
                 with self._lock:
                     line = self._board.next_line(time.monotonic() + LISTEN_S)
@@ -137,10 +137,6 @@ class Talk:
             if line:
                 self._show(line)
             time.sleep(0.0 if line else 0.01)  # whoever waits to ask comes first
-
-    def end(self) -> None:
-        """End the thread's work."""
-        self._ends.set()
 
     def stop(self) -> None:
         """Everything off, at once, whatever is under way."""
@@ -169,18 +165,21 @@ class Talk:
             self._show(one)
 
 
-def talk_at_a_terminal(board: Board, file: Path | None) -> None:
+def talk_at_a_terminal(board: Board) -> None:
     """Let a user type until Ctrl-D, with history, completion and help."""
     known = Known(words_of(board.ask("help", LONGEST_S)), board.settings())
     talk = Talk(board, print)
-    keys = KeyBindings()
+    keys, history = KeyBindings(), InMemoryHistory()
+    with suppress(OSError):
+        home().mkdir(parents=True, exist_ok=True)
+        history = FileHistory(str(home() / "console-history"))
 
     @keys.add("!")
     def _(event: KeyPressEvent) -> None:
         talk.stop()
 
     prompt: PromptSession[str] = PromptSession(
-        history=FileHistory(str(file)) if file else InMemoryHistory(),
+        history=history,
         completer=known,
         complete_while_typing=True,
         key_bindings=keys,
@@ -202,7 +201,7 @@ def talk_at_a_terminal(board: Board, file: Path | None) -> None:
                 talk.say(line)
             if line.startswith("$") and ("=" in line or line == "$defaults"):
                 known.settings |= board.settings() if line == "$defaults" else dict([line[1:].split("=", 1)])
-        talk.end()
+        talk.ends.set()
         listener.join(2)
     if talk.trouble:
         raise WorkError(talk.trouble)
@@ -239,18 +238,10 @@ def console(port: str | None, simulate: bool) -> None:
         try:
             if sys.stdin.isatty():
                 out.print(board.version[0])
-                talk_at_a_terminal(board, _history_file())
+                talk_at_a_terminal(board)
             else:
                 talk_from_a_pipe(board, sys.stdin)
         finally:
             board.ask("telemetry off")
             if board.status().startswith("<on"):
                 out.print("springs are on, and stay on")
-
-
-def _history_file() -> Path | None:
-    try:
-        home().mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return None
-    return home() / "console-history"
