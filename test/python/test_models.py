@@ -45,6 +45,7 @@ def refused(path: Path, read: Callable[[Path], object]) -> tuple[str, str]:
         (ARRAY + 'pitch_mm = "4"\n', "4:12", "must be a number, without quotes"),
         (ARRAY + "[spring]\nturns = -1\n", "5:9", "turns is -1"),
         (ARRAY + "[spring]\nturns = inf\n", "5:9", "turns"),
+        (ARRAY + f"[spring]\nturns = {10**400}\n", "5:9", "it must be 0.1 to 1000"),
         (ARRAY + "[material]\n# turns = 1\n  mass = 2\n", "6:3", "no key 'mass'"),
         (ARRAY + '[sensor]\nnoise_c = "0.3"\n', "5:11", "without quotes"),
         (ARRAY + "[sensor]\nkind = 3\n", "5:8", "text in quotes"),

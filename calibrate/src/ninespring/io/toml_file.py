@@ -147,7 +147,8 @@ def _should_be(kind: Any, value: Any) -> str:
         return f"must be {limits.description or 'text in quotes'}"
     if isinstance(value, bool) or not isinstance(value, int | float):
         return "must be a number, without quotes"
-    return f"is {value:g}; it must be {limits.ge:g} to {limits.le:g}"
+    shown = f"{value:g}" if isinstance(value, float) else str(value)[:20]  # a whole number may be beyond any float
+    return f"is {shown}; it must be {limits.ge:g} to {limits.le:g}"
 
 
 def did_you_mean(wrong: str, names: Iterable[str]) -> str:
