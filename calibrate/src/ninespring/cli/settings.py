@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..io import history as kept
 from ..io.board import Board, read_settings
 from ..model import tables
-from .console import FILE, PORT, beside, command, out, output, write
+from .console import FILE, PORT, command, out, output, write
 
 
 @click.group()
@@ -40,18 +40,16 @@ def read(port: str, output: Path, changed: bool) -> None:
     Behind each stands what is built in, where it is another.
     """
     version, has = _of_port(port)
-    lines = [f"# from {port}: {version}"]
-    count = 0
+    lines = []
     for name, value in has.items():
         row = tables.setting(name)  # None: this version does not know it
         usual = f"{row.default:.{row.decimals}f}" if row else ""
         same = bool(usual) and float(usual) == float(value)
         if not (changed and same):
             lines.append(f"${name}={value}" + (f"  # built in: {usual}" if usual and not same else ""))
-            count += 1
-    write({output: "\n".join(lines) + "\n"})
+    write({output: "\n".join([f"# from {port}: {version}", *lines]) + "\n"})
     if str(output) != "-":
-        beside(output).print(f"{count} settings -> {output}", soft_wrap=True)
+        out.print(f"{len(lines)} settings -> {output}", soft_wrap=True)
 
 
 @command(
