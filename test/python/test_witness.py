@@ -199,6 +199,17 @@ def test_a_reading_that_a_simulation_starts_from_is_no_spike(tmp_path: Path) -> 
     assert np.isfinite(problem.runs[0].temperature_c[begin, 4])
 
 
+def test_spikes_are_left_out_of_a_problem_and_stay_in_its_log(tmp_path: Path) -> None:
+    """Else another problem of the same log has other readings, and what one search fitted does not serve the other."""
+    problem, fit = array_log(tmp_path / "log.csv")
+    run, left = problem.runs[0], [one.copy() for one in fit.residual]
+    left[0][200, 4] = 40.0
+    shown = run.temperature_c.copy()
+    assert problem.mask_spikes(left) == 1
+    assert np.isnan(problem.runs[0].temperature_c[200, 4])
+    assert np.array_equal(run.temperature_c, shown, equal_nan=True)
+
+
 def test_a_resistance_that_rises_with_temperature_is_told(tmp_path: Path) -> None:
     rises = {"resistance_martensite_rise_per_k": 0.0008, "resistance_austenite_rise_per_k": 0.0005}
     problem, fit = array_log(tmp_path / "log.csv", effects=rises)

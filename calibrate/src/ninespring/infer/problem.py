@@ -131,12 +131,13 @@ class Problem:
     def mask_spikes(self, residual: Sequence[np.ndarray]) -> int:
         """Leave isolated outliers of a residual out of everything that follows; return how many."""
         total = 0
-        for run, mask, noise, left in zip(self.runs, self.mask, self.noise, residual, strict=True):
+        for r, (run, mask, noise, left) in enumerate(zip(self.runs, self.mask, self.noise, residual, strict=True)):
             bad = statistics.spikes(left, noise)
             bad[run.starts] = False  # the simulation starts from them
             share = bad.mean() if bad.size else 0.0
             if 0 < share < 0.02:
-                run.temperature_c[bad] = np.nan
+                # the log stays as it is: another problem of it finds what this one found
+                self.runs[r] = replace(run, temperature_c=np.where(bad, np.nan, run.temperature_c))
                 mask &= ~bad
                 total += int(bad.sum())
         self.count = int(sum(mask.sum() for mask in self.mask))
