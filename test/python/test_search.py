@@ -138,6 +138,12 @@ def test_what_half_a_fan_gives_is_found_where_it_blew_at_half(make_log, share: f
 def test_no_fan_curve_is_named_where_there_is_none_or_nothing_shows_it(make_log) -> None:
     proportional = diagnosis.diagnose(Array(), [read_log(make_log(seconds=900, half=True), 9)])
     assert proportional.result["effects"] == []
+
+    def only_half(columns: dict[str, np.ndarray]) -> None:
+        columns["fan"] = 0.5 * columns["fan"]
+
+    run = read_log(make_log(seconds=900, change=only_half), 9)
+    assert not scene_of(diagnosis.prepare(Array(), [run])).fan_between, "half of what, no run of it tells"
     curve = {"fan_curve": {"fan_half_share": 0.735}}
     only_full = diagnosis.diagnose(Array(), [read_log(make_log(effects=curve, seconds=900), 9)])
     assert only_full.result["effects"] == [] and "fan_half_share" not in only_full.model.parameters
