@@ -187,6 +187,28 @@ def test_a_glitch_is_left_out_and_nothing_else(make_log) -> None:
     assert np.flatnonzero(np.isnan(run.temperature_c[:, 0])).tolist() == [250]
 
 
+@pytest.mark.parametrize("off_k", [16.0, -52.0])
+def test_a_first_reading_that_is_a_spike_is_where_no_simulation_starts(make_log, off_k: float) -> None:
+    def spike(columns: dict[str, np.ndarray]) -> None:
+        columns["t2_c"][0] += off_k
+
+    clean, run = read_log(make_log("clean.csv")), read_log(make_log(change=spike))
+    assert run.temperature_c[0, 1] == clean.temperature_c[1, 1]
+    assert np.array_equal(np.delete(run.temperature_c, 1, axis=1), np.delete(clean.temperature_c, 1, axis=1))
+    assert any("t2_c: the first reading" in note for note in run.notes)
+
+
+def test_a_spring_that_is_heated_or_cools_from_the_first_row_on_begins_where_it_is_read(make_log) -> None:
+    def quick(columns: dict[str, np.ndarray]) -> None:
+        since = np.arange(len(columns["t1_c"]))
+        columns["t1_c"] = 60.0 - 35.0 * np.exp(-since / 3.0)
+        columns["t2_c"] = 25.0 + 60.0 * np.exp(-since / 3.0)
+        columns["i1_a"][:] = 1.0
+
+    run = read_log(make_log(change=quick))
+    assert run.temperature_c[0, :2] == pytest.approx([25.0, 85.0])
+
+
 @pytest.mark.parametrize("shows", [0.0, 85.0])
 def test_rows_before_the_first_reading_are_no_readings(make_log, shows: float) -> None:
     def nothing_yet(columns: dict[str, np.ndarray]) -> None:

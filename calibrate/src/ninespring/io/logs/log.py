@@ -171,6 +171,7 @@ def read_log(
     mending.mend_placeholders(run)
     mending.refuse_wrong_units(run, table)
     mending.mask_bad_sensors(run)
+    mending.mend_first_reading(run)
     mending.mask_glitches(run)
     mending.find_gaps(run)
     run.warm = mending.begins_warm(run)

@@ -23,6 +23,8 @@ FEW = 0.01
 """Part of the rows: so many times may be there twice, as programs log that simulate by steps. More are of a clock that is too coarse."""
 RESTED_K = 3.0
 """How far below its first readings a spring may come that began at its room: a room drifts, in Fahrenheit twice as far."""
+QUICKER = 4.0
+"""Times as far as from row to row afterwards a thermometer may go in its first row, rows being as far apart as its spring is slow."""
 RUN_IN_S = 120.0
 """After a gap: how long the noise of the temperatures that the simulation starts from is still felt."""
 
@@ -232,6 +234,27 @@ def mask_glitches(run: Run) -> None:
             run.notes.append(
                 f"t{k + 1}_c: {bad.size} isolated spike(s) left out, the first at {run.time_s[bad[0]]:g} s"
             )
+
+
+def mend_first_reading(run: Run) -> None:
+    """A first reading that the next ones know nothing of: where it is not, a spring could not have come from it in one row.
+
+    The thermometer then begins at its next one: a simulation starts there.
+    """
+    noise = noise_floor(run.temperature_c)
+    for k in range(run.springs):
+        values = run.temperature_c[:4, k]
+        if len(values) < 4 or not np.isfinite([*values, noise[k]]).all():
+            continue
+        jump = float(values[1] - values[0])
+        moves = np.abs(np.diff(run.temperature_c[1:, k]))
+        # what begins to move goes on moving; what is heated from the first row on answers as quickly as it ever does, too
+        heated = run.drive[0, k] > 0 and jump > 0
+        usual = float(np.nanquantile(moves, 0.99)) if heated else 0.0
+        most = QUICKER * max(usual, float(moves[:2].max()))
+        if abs(jump) > 10.0 * max(float(noise[k]), 0.02) + most:
+            run.temperature_c[0, k] = values[1]
+            run.notes.append(f"t{k + 1}_c: the first reading, {values[0]:g} degC, is a spike, left out")
 
 
 def begins_warm(run: Run) -> bool:
