@@ -196,6 +196,18 @@ def test_a_run_that_began_warm_is_not_taken_for_one_at_rest() -> None:
     assert value == pytest.approx(22.0, abs=0.3) and sigma < 1.0
 
 
+def test_a_run_whose_thermometers_are_apart_did_not_begin_as_those_at_rest() -> None:
+    """Its coldest is no warmer than a room, and may yet have been driven: what the first minute says decides."""
+
+    def told(apart_k: float) -> float:
+        run = one_run(24.0, 24.0, 0.0)
+        run = replace(run, temperature_c=np.column_stack([run.temperature_c, run.temperature_c + apart_k]))
+        parts = [one.with_told(21.5, 1.0) for one in room.guessed(run, 20.5, (0.0, 0.3))]
+        return room._moments(parts)[0]
+
+    assert told(8.0) < 22.6 < 23.2 < told(0.5)
+
+
 def test_runs_that_began_at_rest_say_that_another_does() -> None:
     runs = [one_run(at, at, 0.0) for at in (18.0, 21.0, 23.0)]
     over = room.over_first(runs, [18.1, 21.1, 23.1])
@@ -245,6 +257,10 @@ def test_a_run_that_was_heated_before_says_nothing_of_its_room() -> None:
     runs = [cold, near, apart, hot, replace(cold, warm=True)]
     assert room.rested(runs) == [True, True, False, False, False]
     assert room.rested(runs[:1]) == [False], "one run alone may have begun as no other does"
+    assert room.rested([cold, apart]) == [True, False], "it did not where the others began warmer"
+    colder = replace(apart, temperature_c=apart.temperature_c - 3.0)
+    assert room.rested([cold, colder]) == [False, False], "a room is no warmer than what is in it"
+    assert room.over_first([cold, apart], [22.5, 10.0]) == pytest.approx((0.5, room.MOVES_K * math.sqrt(2.0)))
     assert room.rested([hot, replace(hot, temperature_c=hot.temperature_c + 1.0)]) == [False, False], (
         "no room is so hot"
     )

@@ -35,6 +35,8 @@ WARM_K = 60.0
 """Within which a spring is of its room that was driven shortly before its run began."""
 AS_OTHERS = 0.9
 """How likely a run begins as those did that were fitted, before it is seen."""
+COLDEST_RESTED = 0.5
+"""The same where its springs are apart: the coldest of them was driven before, or it was not."""
 SAME_K = 0.3
 """How well runs that agree know how much warmer than its first reading a room is, at best."""
 MOVES_K = 1.0
@@ -87,13 +89,17 @@ def _begins_at(run: Run) -> tuple[float, float]:
 def rested(runs: Sequence[Run]) -> list[bool]:
     """Return which runs began at their room: thermometers together, no hotter than rooms are nor than they differ from the coldest such start.
 
-    None of one such run alone: it may have begun as no other does.
+    One such run alone may have begun as no other does: it did not where the others began warmer, and not together.
     """
     begins = [(math.nan, math.inf) if run.warm else _begins_at(run) for run in runs]
     together = [first for first, apart in begins if apart <= TOGETHER_K]
     most = min(HOTTEST_C, min(together, default=HOTTEST_C) + 4.0 * ROOMS_K)
     found = [apart <= TOGETHER_K and first <= most for first, apart in begins]
-    return found if sum(found) > 1 else [False] * len(runs)
+    coldest = min((first for first, _ in begins if math.isfinite(first)), default=math.nan)
+    one_of_others = len(runs) > 1 and any(
+        cold and first <= coldest for cold, (first, _) in zip(found, begins, strict=True)
+    )
+    return found if sum(found) > 1 or one_of_others else [False] * len(runs)
 
 
 def believed(runs: Sequence[Run]) -> list[tuple[float, float]]:
@@ -117,7 +123,7 @@ def over_first(runs: Sequence[Run], ambient_c: Sequence[float]) -> tuple[float, 
     over = np.array([room - first_c(run) for run, room, cold in parts if cold])
     if not over.size:
         return None
-    apart = max(SAME_K, float(np.std(over, ddof=1)))
+    apart = max(SAME_K, float(np.std(over, ddof=1))) if over.size > 1 else MOVES_K
     return float(np.mean(over)), apart * math.sqrt(1.0 + 1.0 / over.size)
 
 
@@ -137,17 +143,18 @@ def guessed(run: Run, usual_c: float, over: tuple[float, float] | None) -> list[
     """Return what is believed of a run's room before it moves.
 
     Rooms of other days say one thing. What other runs began like says another, if this one began so, too: it may have begun warm,
-    and is then anywhere within WARM_K above its room.
+    and is then anywhere within WARM_K above its room. Where its thermometers are apart it did, but for the coldest, perhaps.
     """
     warm = Guess(0.0, usual_c, ROOMS_K)
-    first = first_c(run)
+    first, apart = _begins_at(run)
     if over is None or not math.isfinite(first):
         return [warm]
     here = first + over[0]
     both = warm.with_told(here, over[1] ** 2)
+    likely = AS_OTHERS if apart <= TOGETHER_K else COLDEST_RESTED
     return [
-        replace(both, nats=both.nats + math.log(AS_OTHERS)),
-        replace(warm, nats=math.log((1.0 - AS_OTHERS) / WARM_K)),
+        replace(both, nats=both.nats + math.log(likely)),
+        replace(warm, nats=math.log((1.0 - likely) / WARM_K)),
     ]
 
 
