@@ -172,8 +172,10 @@ def test_of_many_that_are_there_none_foretells_most(
         ("same", True, ["shared_air"], ["ambient_drift"], 1.06),
         ("found", True, ["shared_air"], ["ambient_drift"], 1.04),
         ("found", True, [], ["ambient_drift"], 2.0),  # no name takes the place of what bends
+        ("same", True, ["shared_air"], [], 2.0),  # what bent was not sure enough and fell, and nothing took its place
         ("found", True, ["shared_air"], ["shared_air", "ambient_drift"], 2.0),
-        ("found", True, ["shared_air"], ["radiation"], 2.0),  # it does not bend
+        ("same", True, ["shared_air"], ["radiation"], 2.0),  # found beside something that bent
+        ("found", True, ["shared_air"], ["radiation"], 1.04),
         ("found", True, ["sensor_lag"], ["ambient_drift", "hidden"], 2.0),  # what has no name is in no model
     ],
 )

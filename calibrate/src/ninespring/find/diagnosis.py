@@ -390,9 +390,9 @@ def _foretelling(
         return same
     progress("what is of one day, or has no name")
     found = account(False, same[0].fits)
-    bends = not found[0].hidden and set(found[0].adopted) & set(unseen.OF_THAT_DAY)
-    instead = set(same[0].adopted) - set(found[0].adopted)
-    return same if bends and instead and _off(*same) * unseen.WORSE < _off(*found) else found
+    # what bent may have been dropped since, and nothing be left in its place
+    instead = set(same[0].adopted) - set(found[0].adopted) if not found[0].hidden else ()
+    return same if instead and _off(*same) * unseen.WORSE < _off(*found) else found
 
 
 def _off(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> float:
