@@ -134,7 +134,7 @@ def test_a_lag_that_foretells_better_is_in_the_model_and_a_name_only_where_it_ex
     monkeypatch.setattr(diagnosis, "_finish", lambda problem, fit: fit)
     case: Any = SimpleNamespace(final=told.base, declared=told.base, search=SimpleNamespace(candidates=[]), plain=False)
     case.hidden, case.adopted, case.progress = [], [], None
-    case.problem = SimpleNamespace(take_for=lambda colour: None)
+    case.problem = SimpleNamespace(colour=None, take_for=lambda colour: None)
     headline = diagnosis._foretold(case, search, told)  # type: ignore[arg-type]
     assert headline is not None and headline.rmse_c == 0.8 and "declared model with a lag" in headline.text
     assert case.final is (told.lagged if worth else told.base) and case.plain != worth
@@ -246,6 +246,45 @@ def test_what_has_no_name_is_not_looked_for_where_only_names_count(
     found = diagnosis._where_something_is_left(problem, first, (final, {}, []), named)
     assert found == ("again", ("lasting", {}, []), [])
     assert looked == ([] if named else ["beside"])
+
+
+@pytest.mark.parametrize(("squares_k", "runs"), [(0.9, 2), (1.1, 2), (0.9, 1)])
+def test_numbers_that_foretell_runs_left_out_better_are_given_to_what_was_found(
+    monkeypatch: pytest.MonkeyPatch, squares_k: float, runs: int
+) -> None:
+    """By least squares, or with what lasts taken for noise: what the model lacks is no noise, and may be foretold worse so."""
+    told = Told({"": 2.0, "lag": 2.0, "shared_air": squares_k})
+    monkeypatch.setattr(told, "own", lambda fit: 1.0)
+    monkeypatch.setattr(told, "carried", lambda fit, reduced: fit)
+    again: list[Any] = []
+
+    def by_least_squares(case: Any) -> Any:
+        again.append(case)
+        return SimpleNamespace(reduced=without)
+
+    monkeypatch.setattr(diagnosis, "_by_least_squares", by_least_squares)
+    monkeypatch.setattr(diagnosis, "_given", lambda *_: None)
+    problem = SimpleNamespace(colour="lasts", runs=[None] * runs)
+    case: Any = SimpleNamespace(problem=problem, hidden=[], final=model("shared_air"), not_kept=[])
+    judge: Any = SimpleNamespace(reduced=without)
+    diagnosis._foretold(case, judge, told)
+    assert again == ([case] if squares_k < 1.0 and runs > 1 else [])
+
+
+def test_by_least_squares_everything_is_fitted_so_again() -> None:
+    problem = Problem(Array(1, 1), [one_node(1.0, seed) for seed in (1, 2)], {"heat_capacity_j_per_k": 2.0})
+    base = first_fit(problem, base_spec(problem))
+    likelihood(problem, base)
+    problem.take_for(base.colour)
+    lasting = problem.fit(base.spec, base.as_dict(), errors=True)
+    case: Any = SimpleNamespace(
+        problem=problem, declared=base, base=lasting, final=lasting, contenders=[("a", lasting)]
+    )
+    case.search, case.progress, case.adopted = SimpleNamespace(candidates=[]), lambda text: None, []
+    judge = diagnosis._by_least_squares(case)
+    assert problem.colour is None and case.search is judge and case.base is base
+    for fit in (case.final, case.contenders[0][1]):
+        assert fit.sse < lasting.sse and fit.sse == pytest.approx(base.sse, rel=1e-4)
 
 
 @pytest.mark.parametrize(("found_k", "plain"), [(1.04, False), (1.2, True)])
