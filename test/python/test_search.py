@@ -19,6 +19,7 @@ from ninespring.infer.problem import Problem
 from ninespring.infer.scene import scene_of
 from ninespring.io import results
 from ninespring.io.logs import log_text, read_log
+from ninespring.io.logs.run import Run
 from ninespring.io.recording import script_lines
 from ninespring.model import effects, native
 from ninespring.model.models import Array, Model
@@ -49,6 +50,52 @@ def heaters() -> Model:
     model = Model(Array(1, 2))
     model.parameters = {"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.01, "command_power_w": 0.6}
     return model
+
+
+def pulsed(path: Path) -> Run:
+    """Return a single pulse, command only: a broad alloy that nobody declared, a late thermometer, a room 3.9 K below its logged one."""
+    rng = np.random.default_rng(4)
+    time_s = np.arange(0.0, 300.0, 0.5)
+    drive = 0.1 * np.exp(-0.5 * ((time_s - 21.0) / 5.5) ** 2)
+    drive[drive < 0.004] = 0.0
+    plant = native.Plant(1, 1)
+    plant.set_effects(["latent_heat", "sensor_lag"])
+    plant.set_all({"heat_capacity_j_per_k": 0.298, "loss_w_per_k": 0.007, "latent_heat_j": 7.0, "sensor_lag_s": 4.0})
+    plant.set_all({"austenite_start_c": 36.3, "austenite_finish_c": 50.0})
+    plant.set_all({"martensite_start_c": 35.5, "martensite_finish_c": 25.3, "command_power_w[1]": 15.7})
+    plant.set_ambient(20.6)
+    plant.reset()
+    shown = plant.simulate(time_s, native.COMMAND, drive[:, None], ambient_c=np.full(600, 20.6))
+    shown += rng.normal(0.0, 0.1, shown.shape)
+    path.write_text(log_text(time_s, {"u1": drive, "t1_c": shown[:, 0], "ambient_c": np.full(600, 24.5)}))
+    return read_log(path, 1)
+
+
+def searched_pulse(path: Path) -> search.Search:
+    """Return a search on a pulse, its alloy declared roughly."""
+    declared = {"command_power_w": 10.0, "austenite_start_c": 48.0, "austenite_finish_c": 58.0}
+    problem = Problem(Array(1, 1), [pulsed(path)], declared | {"martensite_start_c": 42.0, "martensite_finish_c": 32.0})
+    scene = scene_of(problem)
+    base = diagnosis.first_fit(problem, base_spec(problem))
+    return search.Search(problem, [*effects.candidates(scene), *effects.of_runs(scene)], base)
+
+
+def with_one_after_the_other(found: search.Search, *names: str) -> Fit:
+    """Return the fit with effects added one after the other, an alloy as it is found."""
+    fit = found.base
+    for name in names:
+        screen = found.screen(fit)
+        k = max(k for k, one in enumerate(screen.candidates) if one.effect == name)
+        fit = found.refit(fit, [screen.candidates[k]], [screen.forecast([k])[1].get(k, 1.0)])
+    return fit
+
+
+def test_blocks_in_which_a_drive_is_whole_do_not_speak_against_what_only_they_tell(tmp_path: Path) -> None:
+    found = searched_pulse(tmp_path / "pulse.csv")
+    true = with_one_after_the_other(found, "sensor_lag", "latent_heat", "run_ambient_offset")
+    assert true.value("ambient_offset_k@1") == pytest.approx(-3.9, abs=0.5)
+    assert found.problem.holdout_rmse(true) < 0.2 < 1.0 < found.problem.holdout_rmse(found.base)
+    assert found.holds_out(true, found.base)
 
 
 def test_what_is_better_and_fitted_takes_its_place_though_nothing_further_may_be_begun() -> None:

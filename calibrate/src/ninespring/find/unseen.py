@@ -17,7 +17,7 @@ import numpy as np
 from ..infer import room
 from ..infer.fit import Fit
 from ..infer.likelihood import Colour
-from ..infer.problem import BLOCK_S, Problem
+from ..infer.problem import BLOCK_S, HARDLY, Problem
 from ..io import results
 from ..io.logs.run import Run
 from ..io.statistics import rms
@@ -39,8 +39,6 @@ PART = 2.0 / 3.0
 COMES_TRUE = 0.75
 """Part of what an effect changes in the unseen that must come true: all of it does of a cause, a half where the unseen is foretold no
 better than without it. What only takes something else's place is between the two or below."""
-HARDLY = 0.1
-"""Part of what all runs tell of a declared number (its information) below which some of them leave it as all had it."""
 PINNED = 1e-5
 """Spread, in a number's inner coordinate, that leaves it where it is."""
 STEPS = 25

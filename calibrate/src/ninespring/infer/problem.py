@@ -40,6 +40,10 @@ BLOCK_S = 150.0
 """Length of a held-out block: longer than the residual remembers, shorter than a drift of the ambient."""
 
 
+HARDLY = 0.1
+"""Part of what all readings tell of a number (its information) below which some of them leave it as all had it."""
+FIRM = 1e3
+"""How many times as firmly as by all of them."""
 SLOW_KNOTS = 5
 """Knots of a slow drift of the ambient over a run, the first of them zero."""
 
@@ -514,13 +518,23 @@ class Problem:
         fold = self.of_samples([fold_of_rows(run)[:, None] for run in self.runs])
         noise = self.of_samples(self.noise)
         both = np.column_stack([slopes, left])
+        believed = np.column_stack([np.diag(trust), believed])
+
+        def numbers(out: np.ndarray | None = None) -> np.ndarray:
+            rows = both if out is None else np.where(out[:, None], 0.0, both)
+            rows = rows if self.colour is not None else self._whitened(rows)
+            return np.linalg.qr(np.vstack([rows, believed]), mode="r")
+
+        whole = numbers()[: len(z), :-1]
+        back = np.linalg.pinv(whole)
         total = 0.0
         for number in range(FOLDS):
             out = fold == number
-            rows = np.where(out[:, None], 0.0, both)
-            rows = rows if self.colour is not None else self._whitened(rows)
-            rows = np.vstack([rows, np.column_stack([np.diag(trust), believed])])
-            inside = np.linalg.qr(rows, mode="r")
+            inside = numbers(out)
+            # in what only the block tells, as of a drive that is all in it, the rest leaves the numbers as they are
+            _, told, ways = np.linalg.svd(inside[:, :-1] @ back)
+            stays = FIRM * ways[told**2 < HARDLY] @ whole
+            inside = np.vstack([inside, np.column_stack([stays, np.zeros(len(stays))])])
             bounds = (np.minimum(low - z, -1e-9), np.maximum(high - z, 1e-9))
             moved = lsq_linear(inside[:, :-1], -inside[:, -1], bounds, method="bvls").x
             rest = left + slopes @ moved
