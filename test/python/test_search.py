@@ -90,6 +90,15 @@ def with_one_after_the_other(found: search.Search, *names: str) -> Fit:
     return fit
 
 
+def test_an_alloy_that_went_astray_before_its_company_came_begins_again_beside_it(tmp_path: Path) -> None:
+    found = searched_pulse(tmp_path / "pulse.csv")
+    astray = with_one_after_the_other(found, "latent_heat", "sensor_lag")
+    again = found.begun_again(astray, found.base)
+    assert again.spec.effects != () and set(again.spec.effects) == set(astray.spec.effects)
+    assert again.chi2 < 0.7 * astray.chi2
+    assert found.fits[found.key(again.spec)] is again
+
+
 def test_blocks_in_which_a_drive_is_whole_do_not_speak_against_what_only_they_tell(tmp_path: Path) -> None:
     found = searched_pulse(tmp_path / "pulse.csv")
     true = with_one_after_the_other(found, "sensor_lag", "latent_heat", "run_ambient_offset")

@@ -136,13 +136,18 @@ class Search:
     def refit(self, fit: Fit, added: Sequence[Candidate], sizes: Sequence[float]) -> Fit:
         """Fit `fit`'s model with candidates added, from their forecast sizes and other starts."""
         spec = fit.spec
+        for candidate in added:
+            spec = candidate.added_to(spec)
+        key = self.key(spec)
+        if key not in self.fits:
+            self.fits[key] = self._raced(fit, spec, added, sizes)
+        return self.fits[key]
+
+    def _raced(self, fit: Fit, spec: Spec, added: Sequence[Candidate], sizes: Sequence[float]) -> Fit:
+        """Fit a spec, which adds candidates to `fit`'s, from all their starts."""
         start = fit.as_dict()
         for candidate, size in zip(added, sizes, strict=True):
-            spec = candidate.added_to(spec)
             start |= candidate.start_at(size, self.places(fit, candidate)[0])
-        key = self.key(spec)
-        if key in self.fits:
-            return self.fits[key]
         starts = [start]
         for candidate in added:
             others = [candidate.start_at(1.0, place) for place in self.places(fit, candidate)[1:]]
@@ -162,8 +167,25 @@ class Search:
                 start |= candidate.start_at(0.0, self.places(fit, candidate)[0])
             again = self.problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS, near=fit)
             best = min(best, again, key=lambda one: one.chi2)
-        self.fits[key] = best
         return best
+
+    def begun_again(self, fit: Fit, before: Fit) -> Fit:
+        """Return a fit that has grown from `before`, what has several places to begin at begun anew at each of them: without what
+        came later it may have gone astray, and does not come back by itself."""
+        for effect in fit.spec.effects:
+            one = self.candidate_of(fit, effect)
+            if one is None or not one.alternatives or effect in self.base.spec.effects or not self.goes_on():
+                continue
+            other = self.reduced(fit, effect)
+            if self.key(other.spec) == self.key(before.spec):
+                continue  # there it has just begun
+            screen = self.screen(other)
+            k = screen.candidates.index(one)
+            self.progress(f"{effect} again")
+            again = self._raced(other, one.added_to(other.spec), [one], [screen.forecast([k])[1].get(k, 1.0)])
+            if again.chi2 < fit.chi2:
+                fit = self.fits[self.key(again.spec)] = again
+        return fit
 
     def places(self, fit: Fit, candidate: Candidate) -> list[int]:
         """Return the probes of a candidate that promise most on top of a fit, best first."""
@@ -311,7 +333,7 @@ class Search:
                     best, best_added = fit, added
             if best is None or not self.holds_out(best, current):
                 break
-            current = best
+            current = self.begun_again(best, current)
         return current
 
     def backward(self, fit: Fit, share: float = MIN_SHARE) -> tuple[Fit, dict[str, Fit]]:
@@ -431,7 +453,7 @@ class Search:
             fit = self.refit(self.base, [screen.candidates[k] for k in chosen], [sizes[k] for k in chosen])
             if fit.chi2 >= current.chi2:
                 continue  # and so is every part of it
-            fit, _ = self.backward(fit)
+            fit = self.begun_again(self.backward(fit)[0], self.base)
             if fit is not current and fit.chi2 < current.chi2 and self.preferred(fit, current):
                 more = len(fit.spec.effects) - len(current.spec.effects)
                 if more <= 0 or self.worth(fit, current, more):
