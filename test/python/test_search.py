@@ -107,6 +107,17 @@ def test_blocks_in_which_a_drive_is_whole_do_not_speak_against_what_only_they_te
     assert found.holds_out(true, found.base)
 
 
+def test_where_the_room_of_the_only_run_is_bends_nothing(tmp_path: Path) -> None:
+    """It is one number, and stands beside any other in what only helps together."""
+    found = searched_pulse(tmp_path / "pulse.csv")
+    fit = with_one_after_the_other(found, "run_ambient_offset")
+    assert not found.is_flexible(fit, "run_ambient_offset")
+    assert found.handicap(fit, found.base) == 0.0
+    two = [one for one in found.candidates if one.effect == "run_ambient_offset"]
+    drift = [one for one in found.candidates if one.effect == "ambient_drift" and one.flexible]
+    assert len(two) == 1 and not search.bendable(two[0]) and all(search.bendable(one) for one in drift)
+
+
 def test_what_is_better_and_fitted_takes_its_place_though_nothing_further_may_be_begun() -> None:
     one, better = (Fit(Spec((name,)), np.array([]), chi2, 1, []) for name, chi2 in (("one", 2.0), ("better", 1.0)))
 

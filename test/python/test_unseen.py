@@ -96,9 +96,19 @@ def test_where_nothing_foretells_as_well_the_baseline_is_the_answer() -> None:
 
 def test_what_is_of_that_day_is_not_judged_by_another() -> None:
     told = Told({"": 0.5, "lag": 0.5, "ambient_drift": 1.0, RUN_AMBIENT: 1.0})
+    told.splits = [SimpleNamespace(alone=False)]  # type: ignore[list-item]
     for effect in ("ambient_drift", RUN_AMBIENT):
         kept, said = told.kept(model(effect), without)
         assert kept is not None and kept.spec.effects == (effect,) and not said
+
+
+def test_the_rest_of_a_run_alone_is_in_the_room_that_it_began_in() -> None:
+    told = Told({"": 0.5, "lag": 0.5, RUN_AMBIENT: 1.0})
+    kept, said = told.kept(model(RUN_AMBIENT), without)
+    assert kept is not None and kept.spec.effects == (), "judged like any other"
+    assert said[0].startswith("run_ambient_offset is not named")
+    both = model(RUN_AMBIENT, "ambient_drift")
+    assert told.carried(both, without).spec.effects == (RUN_AMBIENT,), "a drift goes its own way"
 
 
 def test_what_is_of_the_array_is_judged_without_what_is_of_that_day() -> None:

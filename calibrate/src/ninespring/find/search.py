@@ -44,6 +44,11 @@ SPRINT = 5
 MAX_EFFECTS = 4
 
 
+def bendable(candidate: Candidate) -> bool:
+    """Return whether a candidate follows anything slow: one number alone, as of where the room of the only run is, does not."""
+    return candidate.flexible and len(candidate.free) > 1
+
+
 @dataclass
 class Search:
     """State of one search: every fit made, by its effects."""
@@ -218,13 +223,15 @@ class Search:
     def preferred(self, one: Fit, other: Fit) -> bool:
         """Return whether `one` takes the place of `other`, which has as many effects.
 
-        What is a run's own does so only where it explains more that matters than what is the same in all runs.
+        What is a run's own does so only where it explains more that matters than what is the same in all runs, if there are
+        several.
         """
-        own = [len(set(fit.spec.effects) & set(RUNS_OWN)) for fit in (one, other)]
-        if own[0] > own[1] and gain(one, other) < MIN_GAIN:
-            return False
-        if own[0] < own[1] and gain(other, one) < MIN_GAIN:
-            return True
+        if len(self.problem.runs) > 1:
+            own = [len(set(fit.spec.effects) & set(RUNS_OWN)) for fit in (one, other)]
+            if own[0] > own[1] and gain(one, other) < MIN_GAIN:
+                return False
+            if own[0] < own[1] and gain(other, one) < MIN_GAIN:
+                return True
         return log_evidence(self.problem, one, other) > self.handicap(one, other)
 
     def candidate_of(self, fit: Fit, effect: str) -> Candidate | None:
@@ -235,7 +242,7 @@ class Search:
     def is_flexible(self, fit: Fit, effect: str) -> bool:
         """Return whether a fit has an effect in a variant that follows anything slow."""
         one = self.candidate_of(fit, effect)
-        return one is not None and one.flexible
+        return one is not None and bendable(one)
 
     def handicap(self, one: Fit, other: Fit) -> float:
         """Return the nats by which `one` must be ahead: TOLD_APART where it alone has a flexible cause, and the other
@@ -243,7 +250,7 @@ class Search:
 
         Negative the other way round; 0 where both have that effect, bent or not.
         """
-        flexible = {c.effect for c in self.candidates if c.flexible}
+        flexible = {c.effect for c in self.candidates if bendable(c)}
         shared = flexible & set(one.spec.effects) & set(other.spec.effects)
         bends = [
             any(self.is_flexible(fit, effect) for effect in fit.spec.effects if effect not in shared)
@@ -388,7 +395,7 @@ class Search:
             for drop, k, sizes in forecasts:
                 name = screen.candidates[k].effect
                 # where something flexible took up something slow, a linear forecast says too little of a slow node
-                slow = own is not None and own.flexible and screen.candidates[k].slow_node
+                slow = own is not None and bendable(own) and screen.candidates[k].slow_node
                 if name in seen or (not slow and (len(seen) >= most or drop < 0.5 * needed)) or not self.goes_on():
                     continue
                 seen.add(name)
@@ -432,7 +439,7 @@ class Search:
             for _, chosen in beam:
                 there = {screen.candidates[k].effect for k in chosen}
                 for k, one in enumerate(screen.candidates):
-                    if one.effect in there or one.flexible or (more := chosen | {k}) in grown:
+                    if one.effect in there or bendable(one) or (more := chosen | {k}) in grown:
                         continue
                     drop, _ = screen.forecast(sorted(more))
                     price = sum(numbers[j] for j in more) * 0.5 * math.log(fit.count) + self.price(len(more))

@@ -252,9 +252,11 @@ class Unseen:
 
     def carried(self, fit: Fit, reduced: Callable[[Fit, str], Fit]) -> Fit:
         """Return a fit without what is of that day: no other run tells that, and beside it a part of the runs tells little of
-        the rest."""
+        the rest. What a run alone began with is the rest's, too: only what drifts is not."""
+        alone = bool(self.splits) and self.splits[0].alone
+        of_that_day = set(OF_THAT_DAY) - set(RUNS_OWN if alone else ())
         for effect in fit.spec.effects:
-            if effect in OF_THAT_DAY and effect not in self.base.spec.effects:
+            if effect in of_that_day and effect not in self.base.spec.effects:
                 fit = reduced(fit, effect)
         return fit
 
@@ -269,7 +271,7 @@ class Unseen:
                 break
             fewer = {effect: reduced(bare, effect) for effect in names}
             if not self.worse(bare):
-                if bare is not fit:
+                if any(e in OF_THAT_DAY and e not in self.base.spec.effects for e in fit.spec.effects):
                     break  # the unseen has that day's, too: it says too little of what comes true
                 true = {effect: self.comes_true(bare, fewer[effect]) for effect in names}
                 out = min(true, key=true.__getitem__)
