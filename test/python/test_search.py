@@ -118,6 +118,18 @@ def test_where_the_room_of_the_only_run_is_bends_nothing(tmp_path: Path) -> None
     assert len(two) == 1 and not search.bendable(two[0]) and all(search.bendable(one) for one in drift)
 
 
+@pytest.mark.parametrize(("runs", "taken"), [(1, True), (2, False)])
+def test_what_is_a_runs_own_gives_way_to_what_is_the_same_in_all_only_where_there_are_several(
+    monkeypatch: pytest.MonkeyPatch, runs: int, taken: bool
+) -> None:
+    one, other = (Fit(Spec((name,)), np.array([]), 1.0, 1, []) for name in ("run_ambient_offset", "sensor_gain"))
+    one.sse = other.sse = 1.0
+    monkeypatch.setattr(search, "log_evidence", lambda problem, better, fit: 2.0 if better is one else -2.0)
+    problem = SimpleNamespace(budget=budget.Budget(), runs=[None] * runs)
+    found = search.Search(problem, [], one)  # type: ignore[arg-type]
+    assert found.preferred(one, other) is taken and found.preferred(other, one) is not taken
+
+
 def test_what_is_better_and_fitted_takes_its_place_though_nothing_further_may_be_begun() -> None:
     one, better = (Fit(Spec((name,)), np.array([]), chi2, 1, []) for name, chi2 in (("one", 2.0), ("better", 1.0)))
 
