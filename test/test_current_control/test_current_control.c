@@ -174,16 +174,6 @@ TEST(supply_that_comes_back_is_met_before_it_is_a_fault)
     }
 }
 
-TEST(mean_current_is_the_target)
-{
-    for (int32_t spring_mohm = 120; spring_mohm <= 300; spring_mohm += 30) {
-        load.spring_mohm = spring_mohm;
-        mean_ua(1500, 100);
-        TEST_ASSERT_INT32_WITHIN(2000, 1500000,
-                                 mean_ua(1500, 400)); /* 2 mA; a duty step is 11..20 mA */
-    }
-}
-
 TEST(reference_rises_by_the_slew_and_falls_at_once)
 {
     parameters.slew_ma_per_tick = 100;
@@ -202,24 +192,6 @@ TEST(reference_rises_by_the_slew_and_falls_at_once)
     TEST_ASSERT_INT32_WITHIN(40000, 700000, load.now_ua);
     TEST_ASSERT_EQUAL_UINT16(0, tick(0));
     TEST_ASSERT_EQUAL_UINT16(0, current_control_reference_ma(&control, 0));
-}
-
-/* A loop that is as declared has nothing to learn, whatever the age of the readings. */
-TEST(old_readings_teach_nothing_false)
-{
-    parameters.slew_ma_per_tick = 3200;
-    for (int32_t old_percent = 0; old_percent <= 100; old_percent += 25) {
-        load.old_percent = old_percent;
-        for (uint16_t wait = 0; wait < 4; wait++) { /* falls come at any moment */
-            TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
-            load.now_ua = load.before_ua = 0;
-            for (uint16_t n = 0; n < 400; n++) {
-                tick(n % 40 < 20u + wait ? 3000 : 600);
-                /* 1 % of the loop: readings are whole mA */
-                TEST_ASSERT_INT32_WITHIN(3900 * 256 / 100, 0, control.channel[0].trim_q24);
-            }
-        }
-    }
 }
 
 TEST(channels_have_their_turns_in_alternate_ticks)
@@ -293,20 +265,6 @@ TEST(blind_channel_holds_then_goes_off_then_returns)
     TEST_ASSERT_LESS_OR_EQUAL_UINT16(128, current_control_reference_ma(&control, 0));
 }
 
-TEST(blind_channel_does_not_start_and_follows_a_fall)
-{
-    for (int n = 0; n < 5; n++) {
-        TEST_ASSERT_EQUAL_UINT16(0, tick_with(1500, 190, false, true));
-    }
-    mean_ua(1500, 60);
-    tick_with(800, 190, false, true);
-    TEST_ASSERT_EQUAL_UINT16(800, current_control_reference_ma(&control, 0));
-    for (int n = 0; n < 4; n++) { /* by little or by much */
-        tick_with(n < 2 ? 810 : 1500, 190, false, true);
-        TEST_ASSERT_EQUAL_UINT16(800, current_control_reference_ma(&control, 0));
-    }
-}
-
 TEST(any_input_at_any_moment_stays_within_the_duty_range)
 {
     const int16_t current_ma[] = {INT16_MIN, -1, 0, 1, 3200, INT16_MAX};
@@ -376,19 +334,6 @@ TEST(channels_do_not_touch_each_other)
     TEST_ASSERT_NOT_EQUAL(0, control.channel[3].trim_q24);
     TEST_ASSERT_EQUAL_MEMORY(&control.channel[3], &other.channel[3], sizeof control.channel[3]);
     TEST_ASSERT_EQUAL_UINT16(0, control.channel[4].reference_ma);
-}
-
-/* Each limit: test_parameters. */
-TEST(a_parameter_out_of_range_is_refused_and_found)
-{
-    current_control_parameters_t changed = parameters;
-    changed.maximum_duty_steps = CURRENT_CONTROL_DUTY_STEPS + 1u;
-    const current_control_t before = control;
-    uint16_t bad = UINT16_MAX;
-    TEST_ASSERT_FALSE(current_control_apply(&control, &changed, &bad));
-    TEST_ASSERT_EQUAL_UINT16(PARAMETER_maximum_duty_steps, bad);
-    TEST_ASSERT_FALSE(current_control_init(&control, &changed, NULL));
-    TEST_ASSERT_EQUAL_MEMORY(&before, &control, sizeof control);
 }
 
 /* Whatever it had learnt: after a reset it is off, and begins as one that is new. */
