@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -21,21 +22,26 @@ except ImportError:
     sys.exit(SKIPPED)
 
 
+def hil(program: str, elf: Path, *more: str, waits_s: float = 0.0) -> tuple[subprocess.CompletedProcess, dict]:
+    """A board in the loop with a 1 x 2 array: what was said, and its summary."""
+    with tempfile.TemporaryDirectory() as folder, Board(program, elf, "--speed", "0.1") as board:
+        time.sleep(waits_s)
+        result = Path(folder) / "hil.json"
+        command = [program, "hil", "--port", board.port, "--json", str(result)]
+        command += ["--set", "array.rows=1", "--set", "array.cols=2", *more]
+        run = subprocess.run(command, check=False, capture_output=True, text=True, timeout=120)
+        print(run.stdout, run.stderr)
+        return run, json.loads(result.read_text())
+
+
+def sent(*lines: str) -> list[str]:
+    return [word for line in lines for word in ("--send", line)]
+
+
 def goes_on_between_the_frames(program: str, elf: Path) -> None:
-    result = Path.cwd() / "board_hil.json"
-    with Board(program, elf, "--speed", "0.1") as board:
-        run = subprocess.run(
-            [
-                program, "hil", "--port", board.port, "--duration", str(SIMULATED_S), "--json", str(result),
-                "--set", "array.rows=1", "--set", "array.cols=2",
-                "--send", "policy open", "--send", "on 1", "--send", "on 3", "--send", "model", "--send", "frobnicate",
-            ],
-            check=False, capture_output=True, text=True, timeout=120,
-        )  # fmt: skip
-    print(run.stdout, run.stderr)
+    lines = sent("policy open", "on 1", "on 3", "model", "frobnicate")
+    run, summary = hil(program, elf, "--duration", str(SIMULATED_S), *lines)
     assert run.returncode == 0, run
-    summary = json.loads(result.read_text())
-    result.unlink()
     assert summary["schema"] == "ninespring.hil/1"
     assert summary["simulated_s"] >= SIMULATED_S
     assert summary["ticks"] + summary["lost_frames"] >= SIMULATED_S * 50
@@ -44,57 +50,28 @@ def goes_on_between_the_frames(program: str, elf: Path) -> None:
     # The console goes on between the frames, and the board reads what the plant does.
     assert "error:1 " in run.stdout
     assert "spring 1:" in run.stdout
+    # Of a 1 x 2 array nothing is connected to channel 3.
     assert summary["final_current_a"][0] > 1.0, summary
-    assert summary["final_current_a"][1] == 0.0, summary
-    # A 1 x 2 array: nothing is connected to channel 3.
-    assert summary["final_current_a"][2] == 0.0, summary
+    assert summary["final_current_a"][1:3] == [0.0, 0.0], summary
 
 
 def a_closed_switch_is_found(program: str, elf: Path) -> None:
-    result = Path.cwd() / "board_hil_closed.json"
-    with Board(program, elf, "--speed", "0.1") as board:
-        run = subprocess.run(
-            [
-                program, "hil", "--port", board.port, "--duration", "2.6", "--json", str(result),
-                "--set", "array.rows=1", "--set", "array.cols=2", "--closed", "1", "--closed-at", "1.2",
-                "--send", "policy open", "--send", "on 1", "--send", "on 2", "--send", "faults",
-            ],
-            check=False, capture_output=True, text=True, timeout=120,
-        )  # fmt: skip
-    print(run.stdout, run.stderr)
+    lines = sent("policy open", "on 1", "on 2", "faults")
+    run, summary = hil(program, elf, "--duration", "2.6", "--closed", "1", "--closed-at", "1.2", *lines)
     assert "board: fault 11 stuck_on: cut the supply" in run.stdout, run
-    summary = json.loads(result.read_text())
-    result.unlink()
     assert summary["final_current_a"][0] > 10.0, summary
     assert summary["final_current_a"][1] == 0.0, summary
 
 
 def what_piled_up_before_is_left_out(program: str, elf: Path) -> None:
-    result = Path.cwd() / "board_hil_piled_up.json"
-    with Board(program, elf, "--speed", "0.1") as board:
-        time.sleep(3)  # some fifteen ticks
-        run = subprocess.run(
-            [
-                program, "hil", "--port", board.port, "--duration", "1", "--json", str(result),
-                "--set", "array.rows=1", "--set", "array.cols=2", "--send", "clear",
-            ],
-            check=False, capture_output=True, text=True, timeout=120,
-        )  # fmt: skip
-    print(run.stdout, run.stderr)
+    run, summary = hil(program, elf, "--duration", "1", *sent("clear"), waits_s=3.0)  # some fifteen ticks
     assert (run.returncode, "ok\n" in run.stdout) == (0, True), run
-    summary = json.loads(result.read_text())
-    result.unlink()
     assert summary["max_lag_ticks"] <= summary["allowed_lag_ticks"], summary
 
 
 def a_port_that_is_not_there_is_said(program: str, elf: Path) -> None:
-    missing = subprocess.run(
-        [program, "hil", "--port", "/no/such/port"],
-        check=False,
-        capture_output=True,
-        text=True,
-        timeout=20,
-    )
+    command = [program, "hil", "--port", "/no/such/port"]
+    missing = subprocess.run(command, check=False, capture_output=True, text=True, timeout=20)
     assert missing.returncode == 2
     assert missing.stderr.count("\n") == 1
 
