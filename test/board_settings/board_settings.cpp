@@ -37,14 +37,6 @@ std::vector<std::string> settings_of(rig &mega)
     return settings;
 }
 
-void same(const std::vector<std::string> &wanted, const std::vector<std::string> &got)
-{
-    TEST_ASSERT_EQUAL_UINT(wanted.size(), got.size());
-    for (std::size_t k = 0; k < wanted.size(); ++k) {
-        TEST_ASSERT_EQUAL_STRING(wanted[k].c_str(), got[k].c_str());
-    }
-}
-
 void save(rig &mega)
 {
     mega.expect_ok("$save");
@@ -59,19 +51,8 @@ void save(rig &mega)
     TEST_FAIL_MESSAGE("the save does not end");
 }
 
-TEST(what_is_not_saved_is_gone_after_power_off)
-{
-    rig mega;
-    mega.boot();
-    const std::vector<std::string> before = settings_of(mega);
-    mega.expect_ok("$heat_capacity_j_per_k=0.321");
-    board_reset(mega.raw(), BOARD_RESET_POWER_ON);
-    mega.boot();
-    same(before, settings_of(mega));
-}
-
-/* The power fails at a sample of the bytes of a save (every byte: test_settings): afterwards the
- * board has the old settings or the new ones, whole. */
+/* The power fails at a sample of the bytes of a save (every byte: test_settings), before the first
+ * of them, too: afterwards the board has the old settings or the new ones, whole. */
 TEST(power_cut_in_a_save_leaves_old_or_new)
 {
     rig first;
@@ -89,8 +70,6 @@ TEST(power_cut_in_a_save_leaves_old_or_new)
     const std::uint64_t bytes = board_eeprom_writes(first.raw()) - begin;
     TEST_ASSERT_TRUE(bytes > 20);
 
-    bool seen_old = false;
-    bool seen_new = false;
     std::vector<std::uint64_t> cuts = {0, 1, 2, bytes - 2, bytes - 1, bytes};
     for (std::uint64_t cut = bytes / 5; cut < bytes - 2; cut += bytes / 5) {
         cuts.push_back(cut);
@@ -113,11 +92,9 @@ TEST(power_cut_in_a_save_leaves_old_or_new)
         const std::vector<std::string> got = settings_of(mega);
         here("a mixture after a cut in byte %u", static_cast<unsigned>(cut));
         TEST_ASSERT_TRUE(got == old_settings || got == new_settings);
-        seen_old = seen_old || got == old_settings;
-        seen_new = seen_new || got == new_settings;
+        TEST_ASSERT_TRUE(cut > 0 || got == old_settings); /* nothing was saved */
+        TEST_ASSERT_TRUE(cut < bytes || got == new_settings);
     }
-    TEST_ASSERT_TRUE_MESSAGE(seen_old, "no cut came early enough");
-    TEST_ASSERT_TRUE_MESSAGE(seen_new, "no save was complete");
 }
 
 /* At once and while springs are driven, without a fault. */
