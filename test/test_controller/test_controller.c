@@ -421,20 +421,29 @@ TEST(where_declarations_contradict_the_ceiling_trips_at_the_limit)
     }
 }
 
-/* A sensor that shows half from 4 s on, and a user who clears and tries again each second: the
- * first time at once, then when the spring has rested for its time constant (52 s). */
-TEST(who_clears_again_and_again_heats_no_spring_whose_sensor_lies)
+static void heat_for_4_s(void)
 {
     settings.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
     start();
     controller_set_temperature(&controller, AMBIENT_C7);
     controller_set_target(&controller, 4, 1000);
     run(200);
+}
+
+static void tick_with_half_a_sensor(void)
+{
+    run(1);
+    inputs.sensor[4].current_ma = (int16_t)(inputs.sensor[4].current_ma / 2);
+}
+
+/* A sensor that shows half from 4 s on, and a user who clears and tries again each second: the
+ * first time at once, then when the spring has rested for its time constant (52 s). */
+TEST(who_clears_again_and_again_heats_no_spring_whose_sensor_lies)
+{
+    heat_for_4_s();
     uint32_t heated = 0, cleared = 0, last = 0, rested = UINT32_MAX;
     for (uint32_t tick = 0; tick < 120u * 50u; tick++) {
-        controller_tick(&controller, &inputs, &outputs);
-        respond();
-        inputs.sensor[4].current_ma = (int16_t)(inputs.sensor[4].current_ma / 2);
+        tick_with_half_a_sensor();
         if (outputs.duty[4] != 0) {
             rested = heated > 0 && tick - last > 100 && tick - last < rested ? tick - last : rested;
             heated++;
@@ -464,16 +473,10 @@ TEST(who_clears_again_and_again_heats_no_spring_whose_sensor_lies)
 /* Nothing is forgotten of a spring that has no fault: the first is found as if nobody cleared. */
 TEST(who_clears_each_second_hides_no_sensor_that_lies)
 {
-    settings.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
-    start();
-    controller_set_temperature(&controller, AMBIENT_C7);
-    controller_set_target(&controller, 4, 1000);
-    run(200);
+    heat_for_4_s();
     uint32_t ticks = 0;
     for (; controller_fault(&controller, 4) == SAFETY_FAULT_NONE && ticks < 400; ticks++) {
-        controller_tick(&controller, &inputs, &outputs);
-        respond();
-        inputs.sensor[4].current_ma = (int16_t)(inputs.sensor[4].current_ma / 2);
+        tick_with_half_a_sensor();
         if (ticks % 50u == 25u) {
             controller_clear_faults(&controller);
             controller_set_target(&controller, 4, 1000);

@@ -24,6 +24,12 @@ TEST(no_heat_from_nothing)
     TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
 }
 
+/* Where a spring of 3 x 3 is after so many quarter turns. */
+static int turned(int spring, int turns)
+{
+    return turns == 0 ? spring : turned(spring % 3 * 3 + 2 - spring / 3, turns - 1);
+}
+
 TEST(rotating_the_pattern_rotates_the_temperatures)
 {
     parameters.air_exchange_uw_per_k = 60000;
@@ -40,13 +46,7 @@ TEST(rotating_the_pattern_rotates_the_temperatures)
         for (int k = 0; k < 3000; k++) {
             if (k % 100 == 0) {
                 for (int i = 0; i < 9; i++) {
-                    int row = i / 3, column = i % 3;
-                    for (int t = 0; t < turn; t++) {
-                        int old = row;
-                        row = column;
-                        column = 2 - old;
-                    }
-                    power_uw[row * 3 + column] = random_bits() % 1000000u;
+                    power_uw[turned(i, turn)] = random_bits() % 1000000u;
                 }
             }
             run(1);
@@ -55,13 +55,7 @@ TEST(rotating_the_pattern_rotates_the_temperatures)
     }
     for (int turn = 1; turn < 4; turn++) {
         for (int i = 0; i < 9; i++) {
-            int row = i / 3, column = i % 3;
-            for (int t = 0; t < turn; t++) {
-                int old = row;
-                row = column;
-                column = 2 - old;
-            }
-            TEST_ASSERT_EQUAL_MEMORY(&state[0].spring[i], &state[turn].spring[row * 3 + column],
+            TEST_ASSERT_EQUAL_MEMORY(&state[0].spring[i], &state[turn].spring[turned(i, turn)],
                                      sizeof state[0].spring[0]);
         }
         TEST_ASSERT_EQUAL_INT32(state[0].air_c23, state[turn].air_c23);
