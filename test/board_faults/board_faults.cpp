@@ -96,30 +96,12 @@ double shown_a(rig &mega, unsigned k)
     return 1e-4 * static_cast<std::int16_t>(board_sensor_register(mega.raw(), k, 1));
 }
 
-unsigned shown_4mv(rig &mega, unsigned k)
-{
-    return board_sensor_register(mega.raw(), k, 2) >> 3;
-}
-
-/* What these sensors show is wrong and looks right: what the firmware makes of it is another
- * test's. */
-TEST(frozen_lying_and_swapped_sensors_show_what_they_should_not)
+/* Of a frozen one, or one that lies, the tests below show it by what is found. */
+TEST(swapped_sensors_show_each_others_current)
 {
     auto mega = driven();
-    board_set_fault(mega->raw(), BOARD_FAULT_FREEZE, 3, true);
-    board_scale_sensor(mega->raw(), 4, 0.8, 1.1);
-    const double frozen_a = shown_a(*mega, 3);
-    mega->expect_ok("on 4 60");
     mega->expect_ok("off 8");
     mega->run_ms(400.0);
-    TEST_ASSERT_TRUE(frozen_a > 0.5);
-    TEST_ASSERT_EQUAL_DOUBLE(frozen_a, shown_a(*mega, 3));
-    TEST_ASSERT_TRUE(std::fabs(board_current_a(mega->raw(), 3) - frozen_a) > 0.2);
-    const double lied_a = board_current_a(mega->raw(), 4);
-    const double ohm = 4e-3 * shown_4mv(*mega, 5) / shown_a(*mega, 5);
-    TEST_ASSERT_TRUE(lied_a > 0.5);
-    TEST_ASSERT_DOUBLE_WITHIN(0.03 * lied_a, 0.8 * lied_a, shown_a(*mega, 4));
-    TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.1 * ohm * lied_a / (4e-3 * shown_4mv(*mega, 4)), 1.0);
     board_swap_sensors(mega->raw(), 7, 8);
     mega->run_ms(20.0); /* two pairs of conversions */
     TEST_ASSERT_EQUAL_DOUBLE(0.0, shown_a(*mega, 8));
