@@ -2,19 +2,12 @@
 
 #include <math.h>
 
-truth_t truth;
 spring_estimator_t estimator;
 thermal_model_t model;
 
+static thermal_model_t truth;
 static unsigned count;
-static double power_sum_w;
-static uint32_t random_state;
-
-static uint32_t random_bits(void)
-{
-    random_state = random_state * 1664525u + 1013904223u;
-    return random_state >> 8;
-}
+static uint32_t power_sum_uw, random_state;
 
 void power_comes_on(void)
 {
@@ -23,15 +16,11 @@ void power_comes_on(void)
     p.rows = p.columns = 1;
     (void)thermal_model_init(&model, &p, NULL);
     spring_estimator_init(&estimator, &model);
-    truth = (truth_t){.capacity_j_per_k = p.heat_capacity_mj_per_k * 1e-3,
-                      .loss_w_per_k = p.loss_uw_per_k * 1e-6,
-                      .latent_j = 8.65,
-                      .martensite_ohm = p.resistance_martensite_uohm * 1e-6,
-                      .ratio = 1.25,
-                      .noise_v = 0.004,
-                      .temperature_c = 20.0};
+    p.heat_capacity_mj_per_k += p.heat_capacity_mj_per_k / 10u;
+    (void)thermal_model_init(&truth, &p, NULL);
+    thermal_model_reset(&truth, 20 * 128);
     count = 0;
-    power_sum_w = 0.0;
+    power_sum_uw = 0;
     random_state = 5;
 }
 
@@ -42,84 +31,33 @@ void begin_cold(void)
     spring_estimator_trust_model(&estimator, &model);
 }
 
-static double share(double from_c, double to_c)
+/* A voltage is read in steps of 4 mV, give or take one. */
+void tick(double current_a)
 {
-    const double at = (truth.temperature_c - truth.shift_k - from_c) / (to_c - from_c);
-    return at < 0.0 ? 0.0 : at > 1.0 ? 1.0 : at;
-}
-
-static void live(double power_w)
-{
-    const double heat_j = (power_w - truth.loss_w_per_k * (truth.temperature_c - 20.0)) * TICK_S;
-    const double formed = share(88.0, 98.0);
-    const double kept = share(68.0, 78.0);
-    const bool transforms = (heat_j > 0.0 && formed >= truth.austenite && formed < 1.0 &&
-                             truth.temperature_c - truth.shift_k >= 88.0) ||
-                            (heat_j < 0.0 && kept <= truth.austenite && kept > 0.0 &&
-                             truth.temperature_c - truth.shift_k <= 78.0);
-    truth.temperature_c +=
-        heat_j / (truth.capacity_j_per_k + (transforms ? truth.latent_j / 10.0 : 0.0));
-    truth.austenite = fmin(fmax(truth.austenite, share(88.0, 98.0)), share(68.0, 78.0));
-}
-
-double resistance_ohm(void)
-{
-    const double above_k = truth.temperature_c - 20.0;
-    const double austenite_ohm = truth.martensite_ohm * truth.ratio *
-                                 (1.0 + (truth.rise_per_k + truth.apart_per_k) * above_k);
-    return (1.0 - truth.austenite) * truth.martensite_ohm * (1.0 + truth.rise_per_k * above_k) +
-           truth.austenite * austenite_ohm;
-}
-
-double distance_k(void)
-{
-    return truth.temperature_c - truth.shift_k - 78.0;
-}
-
-static double one_to_minus_one(void)
-{
-    return (double)(random_bits() % 2001u) / 1000.0 - 1.0;
-}
-
-static void read_sensor(double current_a, int16_t *ma, int16_t *mv)
-{
-    static double slow; /* of standard deviation 1 */
-    double noise_v = truth.noise_v * one_to_minus_one();
-    if (truth.slow_noise_v > 0.0) {
-        slow = slow * 0.98 + 0.345 * one_to_minus_one();
-        noise_v += truth.slow_noise_v * slow;
-    }
-    *ma = (int16_t)lround(1000.0 * current_a);
-    *mv = (int16_t)(4 *
-                    lround(250.0 * (current_a * (resistance_ohm() + truth.contact_ohm) + noise_v)));
-}
-
-bool tick(double current_a)
-{
-    int16_t ma, mv;
-    live(current_a * current_a * resistance_ohm());
-    read_sensor(current_a, &ma, &mv);
-    spring_estimator_take(&estimator, 0, ma, mv);
-    power_sum_w += ma > 0 && mv > 0 ? 1e-6 * ma * mv : 0.0;
+    const double mv = 1e-3 * current_a * thermal_model_resistance_uohm(&truth, 0);
+    random_state = random_state * 1664525u + 1013904223u;
+    const int16_t read_mv = (int16_t)(4 * lround(mv / 4.0 + (random_state >> 8) % 3u - 1.0));
+    const int16_t read_ma = (int16_t)lround(1000.0 * current_a);
+    spring_estimator_take(&estimator, 0, read_ma, read_mv);
+    power_sum_uw += read_mv > 0 ? (uint32_t)(read_ma * read_mv) : 0;
     count++;
     if (count % 5u == 0) {
-        const uint32_t power_uw =
-            spring_estimator_model_power_uw(&estimator, 0, (uint32_t)(power_sum_w * 1e6 / 5.0));
+        const uint32_t true_uw = power_sum_uw / 5u;
+        const uint32_t power_uw = spring_estimator_model_power_uw(&estimator, 0, true_uw);
+        thermal_model_step(&truth, &true_uw);
         thermal_model_step(&model, &power_uw);
-        power_sum_w = 0.0;
+        power_sum_uw = 0;
     }
     /* a turn each 0.25 s: 12 ticks, then 13 */
     if (count % 25u == 0 || count % 25u == 12u) {
         spring_estimator_update(&estimator, &model, 0);
-        return true;
     }
-    return false;
 }
 
 void ticks(double current_a, double seconds)
 {
     for (long n = lround(seconds / TICK_S); n > 0; n--) {
-        (void)tick(current_a);
+        tick(current_a);
     }
 }
 
@@ -129,7 +67,7 @@ void heat_then_hold(double most_s)
     spring_estimator_begin_heating(&estimator, &model, 0);
     for (double s = 0.0; s < most_s && !spring_estimator_has_transformed(&estimator, &model, 0);
          s += TICK_S) {
-        (void)tick(3.0);
+        tick(3.0);
     }
     spring_estimator_disturb(&estimator, 0);
     spring_estimator_begin_hold(&estimator, &model, 0, true);
@@ -151,6 +89,6 @@ double hold_current_a(double margin_k)
 void hold(double margin_k, double seconds)
 {
     for (double s = 0.0; s < seconds; s += TICK_S) {
-        (void)tick(hold_current_a(margin_k));
+        tick(hold_current_a(margin_k));
     }
 }

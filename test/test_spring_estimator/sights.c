@@ -40,12 +40,13 @@ static void expect_kinds(const spring_sight_kind_t kinds[], unsigned count)
 TEST(each_sight_of_a_life_is_noted_with_what_was_done)
 {
     static const spring_sight_kind_t kinds[] = {SPRING_SIGHT_TOLD, SPRING_SIGHT_ONSET,
-                                                SPRING_SIGHT_FINISH, SPRING_SIGHT_LOST};
+                                                SPRING_SIGHT_FINISH, SPRING_SIGHT_KEPT,
+                                                SPRING_SIGHT_LOST};
     begin_cold();
     spring_estimator_begin_heating(&estimator, &model, 0);
     bool still = false; /* seen to transform still: what comes next tells that, too */
     while (!spring_estimator_has_transformed(&estimator, &model, 0)) {
-        (void)tick(3.0);
+        tick(3.0);
         if (newest()->kind == SPRING_SIGHT_TRANSFORMS) {
             still = true;
             TEST_ASSERT_EQUAL_INT16(200, newest()->now); /* austenite finish */
@@ -57,15 +58,16 @@ TEST(each_sight_of_a_life_is_noted_with_what_was_done)
     double margin_k = 4.0; /* nearer and nearer, until phase is seen to be lost */
     for (double s = 0.0; s < 400.0 && spring_estimator_lost(BELIEF) == 0.0f; s += TICK_S) {
         margin_k -= spring_estimator_rests(BELIEF) ? 0.08 * TICK_S : 0.0;
-        (void)tick(hold_current_a(margin_k));
+        tick(hold_current_a(margin_k));
     }
-    static const uint8_t did[] = {SPRING_DID_HEAT, 0, SPRING_DID_HOLD, 0};
-    expect_kinds(kinds, 4);
-    for (unsigned i = 0; i < 4; i++) {
+    static const uint8_t did[] = {SPRING_DID_HEAT, 0, SPRING_DID_HOLD, 0, 0};
+    expect_kinds(kinds, ROWS(kinds));
+    for (unsigned i = 0; i < ROWS(kinds); i++) {
+        row(i);
         TEST_ASSERT_EQUAL_UINT8(did[i], sight_at(i)->did);
     }
     spring_estimator_begin_heating(&estimator, &model, 0);
-    TEST_ASSERT_EQUAL_UINT8(SPRING_DID_HEAT, sight_at(3)->did);
+    TEST_ASSERT_EQUAL_UINT8(SPRING_DID_HEAT, sight_at(4)->did);
     const double ago_s =
         0.25 * spring_sights_age_turns(spring_estimator_sights(&estimator), sight_at(2));
     TEST_ASSERT_TRUE(ago_s > 20.0 && ago_s < 330.0);

@@ -205,6 +205,58 @@ TEST(a_dither_across_the_limit_is_no_reheat)
     TEST_ASSERT_EQUAL_INT(1, score.spring[4].reheats);
 }
 
+/* Each spring of one array has something else: capacity, loss and transformation as far off as is
+ * tolerated; coefficients in print, whatever the change; a contact that steps or ages; a noise that
+ * stays for a second. None of that is lost phase: it is heated for it twice at the most, and has
+ * lost none. */
+TEST(springs_are_within_their_bounds_and_nothing_else_is_taken_for_lost_phase)
+{
+    static const struct {
+        double size, loss, shift_mpa, ratio, per_k[2], contact_ohm, step_ohm, age_ohm_per_s, slow_v;
+    } table[] = {{1.00, 1.00, 0.0, 1.25, {0.0010, 0.0010}, 0.0, 0.0, 0.0, 0.0},
+                 {0.85, 1.15, 0.0, 1.25, {0.0, 0.0014}, 0.0, 0.0, 0.0, 0.0},
+                 {1.15, 0.85, 0.0, 1.25, {0.0012, 0.0}, 0.0, 0.0, 0.0, 0.0},
+                 {1.00, 1.00, 40.0, 1.40, {0.0, 0.0014}, 0.0, 0.0, 0.0, 0.0},
+                 {0.85, 0.85, 0.0, 0.85, {0.0, -0.0002}, 0.0, 0.0, 0.0, 0.0},
+                 {1.15, 1.15, 0.0, 1.25, {0.0, 0.0}, 0.0, 0.025, 0.0, 0.0},
+                 {1.00, 1.15, 0.0, 1.25, {0.0, 0.0}, 0.025, -0.025, 0.0, 0.0},
+                 {1.00, 0.85, 20.0, 1.25, {0.0, 0.0}, 0.0, 0.0, 0.01 / 900.0, 0.0},
+                 {1.00, 1.00, 0.0, 1.25, {0.0, 0.0}, 0.0, 0.0, 0.0, 0.001}};
+    static run_case_t run;
+    static run_result_t result;
+    memset(&run, 0, sizeof run);
+    run.seconds = 900.0;
+    world_parameters_default(&run.world);
+    controller_settings_default(&run.settings);
+    for (int k = 0; k < (int)ROWS(table); k++) {
+        world_spring_t *spring = &run.world.spring[k];
+        run.on[k] = true;
+        spring->heat_capacity_j_per_k *= table[k].size;
+        spring->loss_w_per_k *= table[k].loss;
+        spring->stress_mpa = table[k].shift_mpa;
+        spring->austenite_ohm = table[k].ratio * spring->martensite_ohm;
+        spring->martensite_per_k = table[k].per_k[0];
+        spring->austenite_per_k = table[k].per_k[1];
+        spring->contact_ohm = table[k].contact_ohm;
+        spring->sensor.slow_voltage_noise_v = table[k].slow_v;
+        run.world.event[run.world.events++] =
+            (world_event_t){WORLD_CONTACT_OHM, 500.0, k, table[k].contact_ohm + table[k].step_ohm};
+        run.world.event[run.world.events++] =
+            (world_event_t){WORLD_CONTACT_OHM_PER_S, 500.0, k, table[k].age_ohm_per_s};
+    }
+    TEST_ASSERT_TRUE(run_case(&run, &result, NULL));
+    double known_s = 0.0, inside_s = 0.0;
+    for (int k = 0; k < (int)ROWS(table); k++) {
+        const score_spring_t *spring = &result.score.spring[k];
+        row((size_t)k);
+        TEST_ASSERT_TRUE(spring->lowest_held > SCORE_LOST);
+        TEST_ASSERT_LESS_OR_EQUAL_INT(2, spring->false_losses);
+        known_s += spring->known_s;
+        inside_s += spring->inside_s;
+    }
+    TEST_ASSERT_TRUE(inside_s >= 0.99 * known_s && known_s > 8000.0);
+}
+
 /* 'declared' is what every world is drawn from. */
 TEST(an_array_is_the_same_specimen_in_every_world)
 {
