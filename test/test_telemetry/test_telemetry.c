@@ -93,32 +93,6 @@ TEST(a_line_without_room_is_dropped_whole_and_counted)
     TEST_ASSERT_EQUAL_UINT16(65535, telemetry.dropped);
 }
 
-TEST(every_rate_gives_that_many_lines_a_second)
-{
-    for (uint8_t hz = 1; hz <= 50; hz++) {
-        TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, hz));
-        unsigned count = 0;
-        for (unsigned tick = 0; tick < 500; tick++) {
-            said_length = 0;
-            room = 8000;
-            tick_at(tick * 20u, 0);
-            count += said_length > 0;
-        }
-        TEST_ASSERT_EQUAL_UINT(10u * hz, count);
-    }
-}
-
-TEST(teleplot_lines_are_name_ms_value)
-{
-    controller.measured_ma[1] = 1500;
-    TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 50));
-    tick_at(1234, 0);
-    expect_said(">i2:1234:1.500\r\n");
-    expect_said(">m9:1234:20.00\r\n");
-    expect_said(">fault:1234:0\r\n");
-    TEST_ASSERT_EQUAL_UINT(20, lines());
-}
-
 TEST(a_round_of_teleplot_goes_on_where_it_found_no_room)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 5));
