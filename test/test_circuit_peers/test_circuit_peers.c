@@ -43,22 +43,6 @@ static unsigned rounds(unsigned count, uint8_t driven, float expected_mv, float 
     return found;
 }
 
-TEST(one_that_changes_is_found_in_three_windows_and_the_others_are_not)
-{
-    const float expected_mv[] = {HEATS_MV, HOLDS_MV};
-    const float changed[2][2] = {{0.88f, 1.12f}, {0.83f, 1.17f}}; /* offsets are more of less */
-    for (unsigned heats = 0; heats < 2; heats++) {
-        for (unsigned n = 0; n < 2; n++) {
-            setUp();
-            TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, expected_mv[heats], 1.0f, 1.0f));
-            const float share = changed[heats][n];
-            TEST_ASSERT_EQUAL_HEX(0, rounds(2, SPRINGS, expected_mv[heats], share, 1.0f));
-            TEST_ASSERT_EQUAL_HEX(1, rounds(1, SPRINGS, expected_mv[heats], share, 1.0f));
-            TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, expected_mv[heats], 1.0f, 1.0f));
-        }
-    }
-}
-
 TEST(what_all_show_is_the_supply)
 {
     for (float share = 0.5f; share < 1.6f; share += 0.1f) {
@@ -144,30 +128,6 @@ TEST(of_too_few_volts_no_share_is_learnt)
         source.drop_mv = 400.0f;
         TEST_ASSERT_EQUAL_HEX(0, rounds(2, SPRINGS, more != 0 ? 260.0f : 240.0f, 1.0f, 1.0f));
         TEST_ASSERT_EQUAL_UINT(more, peers.spring[SPRINGS - 1u].learnt != 0);
-    }
-}
-
-/* As long as nobody knows it, a drop takes as much of what others show: at the same voltage it
- * makes no difference, at another one it may be all of it. */
-TEST(what_is_not_known_of_the_drop_is_let_pass_where_others_are_driven_otherwise)
-{
-    source.unsure_mv = source.less_mv =
-        200.0f; /* of 1140 and 400 mV: 130 mV, a third of the lower one */
-    TEST_ASSERT_EQUAL_HEX(0, rounds(3, SPRINGS, HEATS_MV, 1.25f, 1.0f)); /* alone in the first */
-    TEST_ASSERT_EQUAL_HEX(1, rounds(1, SPRINGS, HEATS_MV, 1.25f, 1.0f));
-    TEST_ASSERT_TRUE(peers.spring[1].learnt > 1);
-    const float shares[] = {1.5f, 1.65f};
-    for (unsigned n = 0; n < 2; n++) {
-        memset(&peers, 0, sizeof peers);
-        bool found = false;
-        for (unsigned round = 0; round < 3; round++) {
-            for (uint8_t k = 1; k < SPRINGS; k++) {
-                TEST_ASSERT_FALSE(takes(k, HEATS_MV, 1.0f));
-            }
-            found = takes(0, HOLDS_MV, shares[n]);
-        }
-        TEST_ASSERT_EQUAL(n == 1, found);
-        TEST_ASSERT_EQUAL_UINT(0, peers.spring[0].learnt);
     }
 }
 

@@ -87,20 +87,6 @@ TEST(a_heating_and_a_hold_tell_supply_and_drop)
     }
 }
 
-/* A supply that steps down in a hold looks like 50 mV of a drop. */
-TEST(a_supply_that_steps_is_driven_by_as_declared)
-{
-    rounds(8, 9, (true_t){5240, 0}, 230.0f);
-    rounds(40, 9, (true_t){5240, 0}, 74.0f);
-    float highest_mv = 0.0f;
-    for (unsigned n = 0; n < 40; n++) {
-        rounds(1, 9, (true_t){4760, 0}, n < 10 ? 82.0f : n < 20 ? 136.0f : 90.0f);
-        highest_mv = fmaxf(highest_mv, source.drop_mv - source.unsure_mv);
-        TEST_ASSERT_EQUAL_UINT(0, source.driven_drop_mv);
-    }
-    TEST_ASSERT_TRUE(highest_mv > 0.0f);
-}
-
 /* What may be no drop at all is not driven by, nor does the ceiling count on it. */
 TEST(what_is_driven_by_is_sure)
 {

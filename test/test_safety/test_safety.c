@@ -124,18 +124,6 @@ TEST(each_condition_trips_its_own_fault)
     TEST_ASSERT_TRUE(safety_allows(&safety, 4));
 }
 
-TEST(too_little_current_says_nothing_about_the_resistance)
-{
-    safety_sample_t sample = {
-        .current_ma = 299, .voltage_mv = 0, .expected_ma = 299, .temperature_c7 = 0};
-    ticks(4, &sample, 50);
-    sample.voltage_mv = 4000;
-    ticks(4, &sample, 50);
-    sample.current_ma = 0;
-    ticks(4, &sample, 50);
-    TEST_ASSERT_TRUE(safety_allows(&safety, 4));
-}
-
 /* What was counted before stays: a sensor that fails every other tick does not hide a short. */
 TEST(missing_readings_neither_count_nor_forgive)
 {
@@ -200,17 +188,6 @@ TEST(sensor_that_goes_on_showing_what_flowed_is_frozen)
     }
     sample.current_ma--;
     ticks(4, &sample, parameters.bad_samples);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
-}
-
-/* A switch that is closed shows the end of the sensor, on and off alike. */
-TEST(current_that_no_output_gives_is_no_frozen_sensor)
-{
-    safety_sample_t sample = {
-        .current_ma = 3200, .voltage_mv = 2450, .expected_ma = 1500, .temperature_c7 = 0};
-    ticks(4, &sample, 2);
-    sample.off = true;
-    ticks(4, &sample, SAFETY_STUCK_TICKS);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
 }
 
@@ -296,19 +273,6 @@ TEST(a_voltage_that_no_duty_gives_is_current_without_duty)
     ticks(4, &sample, SAFETY_STUCK_TICKS);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
     TEST_ASSERT_TRUE(safety_cuts_supply(&safety));
-}
-
-/* What was doubted by a sensor that then tells nothing is that sensor's fault, and not the
- * supply's. */
-TEST(a_sensor_that_is_silent_holds_no_supply_back)
-{
-    safety_sample_t sample = off;
-    sample.current_ma = 900;
-    ticks(4, &sample, 1);
-    TEST_ASSERT_TRUE(safety_doubts_supply(&safety));
-    sample.sensor_status = 1;
-    ticks(4, &sample, 1);
-    TEST_ASSERT_FALSE(safety_doubts_supply(&safety));
 }
 
 TEST(silent_host_stops_the_board_until_cleared)
