@@ -63,29 +63,6 @@ TEST(rotating_the_pattern_rotates_the_temperatures)
     }
 }
 
-TEST(equal_springs_stay_equal_whatever_the_size)
-{
-    for (uint8_t rows = 1; rows <= 8; rows++) {
-        for (uint8_t columns = 1; columns <= 8; columns++) {
-            if (rows * columns > THERMAL_MODEL_MAX_SPRINGS) {
-                continue;
-            }
-            parameters.rows = rows;
-            parameters.columns = columns;
-            start();
-            for (int i = 0; i < rows * columns; i++) {
-                power_uw[i] = 300000;
-            }
-            run(50);
-            for (uint8_t i = 1; i < rows * columns; i++) {
-                TEST_ASSERT_EQUAL_INT16(thermal_model_temperature_c7(&model, 0),
-                                        thermal_model_temperature_c7(&model, i));
-            }
-            TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
-        }
-    }
-}
-
 /* ---- an effect at zero is no effect ------------------------------------------------------------
  */
 

@@ -76,31 +76,6 @@ TEST(row_of_springs_comes_to_what_is_computed_by_hand)
     }
 }
 
-/* Whatever the curve: what was declared at 0 and 100 %, between ever more. */
-TEST(a_fan_that_blows_harder_never_cools_less)
-{
-    parameters.rows = parameters.columns = 1;
-    parameters.wake_uw_per_k = 1000;
-    for (uint16_t half = 100; half <= 900; half = (uint16_t)(half + 100u)) {
-        parameters.fan_half_share_permille = half;
-        start();
-        TEST_ASSERT_EQUAL_UINT16(5800, model.spring[0].loss_uw_per_k);
-        uint16_t before = 0;
-        for (uint8_t percent = 0; percent <= 100; percent++) {
-            thermal_model_set_fan(&model, percent);
-            TEST_ASSERT_TRUE(model.spring[0].loss_uw_per_k >= before);
-            before = model.spring[0].loss_uw_per_k;
-            if (percent == 50) {
-                TEST_ASSERT_DOUBLE_WITHIN(1.0, 5800.0 + 5.5 * half, before);
-                TEST_ASSERT_DOUBLE_WITHIN(1.0, 586.0 + 0.072 * half, model.orthogonal_uw_per_k);
-                TEST_ASSERT_DOUBLE_WITHIN(1.0, half, model.wake_uw_per_k);
-            }
-        }
-        TEST_ASSERT_EQUAL_UINT16(11300, before);
-        TEST_ASSERT_EQUAL_UINT16(658, model.orthogonal_uw_per_k);
-    }
-}
-
 TEST(air_without_capacity_follows_at_once)
 {
     parameters.air_exchange_uw_per_k = 60000;
