@@ -197,27 +197,6 @@ TEST(cap_fits_and_wastes_less_than_a_milliampere_each)
     }
 }
 
-TEST(boosts_are_staggered_not_diluted)
-{
-    begin_cold(3, 3);
-    for (uint8_t k = 0; k < SPRINGS; k++) {
-        level[k] = 1000;
-    }
-    decisions(ROUND_TICKS);
-    TEST_ASSERT_LESS_OR_EQUAL_UINT32(14800u /* of 15 A the reserve */, decide());
-    unsigned full = 0, none = 0;
-    for (uint8_t k = 0; k < SPRINGS; k++) {
-        full += target_ma[k] > (unsigned)FULL_MA - parameters.dither_ma / 4u;
-        none += target_ma[k] == 0;
-        if (target_ma[k] == 0) {
-            TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_SUPPLY, drive_policy_limits(&policy, k));
-            TEST_ASSERT_EQUAL_UINT16((unsigned)FULL_MA, drive_policy_cut_ma(&policy, k));
-        }
-    }
-    TEST_ASSERT_EQUAL_UINT(4, full);
-    TEST_ASSERT_EQUAL_UINT(4, none); /* the ninth has what is left */
-}
-
 TEST(parameters_outside_their_range_are_refused_whole)
 {
     begin_cold(3, 3);
