@@ -10,16 +10,31 @@
 
 #define COMMON_SHARE 0.5f /* of the variance of a first heating's error */
 
+#define RISE_OWN_PER_K 0.00015f /* by how much springs of one alloy differ */
+
 void spring_begin_alloy(spring_estimator_t *e)
 {
     e->r_phase_odds = R_PHASE_ODDS;
     e->warms = 0.0f;
+    /* any in print: martensite's does not tell it */
+    e->rise_per_k = 0.5f * (COEFFICIENT_MOST_PER_K + COEFFICIENT_IN_PRINT_PER_K);
+    e->rise_sd_per_k =
+        0.5f * (COEFFICIENT_MOST_PER_K - COEFFICIENT_IN_PRINT_PER_K) / SPRING_ESTIMATOR_BOUND_SDS;
 }
 
 void spring_alloy_sees(spring_estimator_t *e, bool other_way)
 {
     const float more = other_way ? R_PHASE_OTHER_WAY : R_PHASE_STRAIGHT;
     e->r_phase_odds = spring_clamp(e->r_phase_odds + more, -R_PHASE_MOST_ODDS, R_PHASE_MOST_ODDS);
+}
+
+void spring_alloy_shows_rise(spring_estimator_t *e, float rise_per_k, float variance)
+{
+    const float prior = e->rise_sd_per_k * e->rise_sd_per_k;
+    const float gain = prior / (prior + variance + RISE_OWN_PER_K * RISE_OWN_PER_K);
+    e->rise_per_k = spring_clamp(e->rise_per_k + gain * (rise_per_k - e->rise_per_k),
+                                 -COEFFICIENT_MOST_PER_K, COEFFICIENT_MOST_PER_K);
+    e->rise_sd_per_k = fmaxf(sqrtf(prior * (1.0f - gain)), RISE_OWN_PER_K);
 }
 
 bool spring_alloy_has_r_phase(const spring_estimator_t *e)

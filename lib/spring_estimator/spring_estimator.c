@@ -379,11 +379,11 @@ static void cool(spring_estimator_t *e, spring_belief_t *b, const thermal_model_
 }
 
 /* In its next turn: nothing that has a seal is written in between. */
-static void end_what_was_left(spring_belief_t *b)
+static void end_what_was_left(const spring_estimator_t *e, spring_belief_t *b)
 {
     if (b->left && b->heating) {
         b->heating = b->onset = b->steep = b->unlike = false;
-        spring_begin_hold_line(b, false);
+        spring_begin_hold_line(e, b, false);
     }
     b->left = false;
 }
@@ -451,7 +451,7 @@ bool spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
         spring_sights_turn(&e->sights);
     }
     if (sound) {
-        end_what_was_left(b);
+        end_what_was_left(e, b);
         take_turn(e, model, k);
     } else {
         open_anew(e, k, false);
@@ -597,7 +597,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     b->quiet = 0;
     b->losing = 0;
     const bool strong = full && b->reads && b->current_a > STRONG_A;
-    spring_begin_hold_line(b, strong);
+    spring_begin_hold_line(e, b, strong);
     if (unseen) {
         spring_note(e, model, k, SPRING_SIGHT_UNSEEN, &before, 0.0f, 0.0f);
     }

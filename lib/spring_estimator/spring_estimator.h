@@ -185,6 +185,8 @@ typedef struct {
     /* what all springs share */
     float r_phase_odds; /* that cooling leads through an intermediate phase: log of them */
     float warms;        /* in a first heating, for a kelvin above ambient: more by so much */
+    float rise_per_k;   /* what a kelvin adds to the resistance of its austenite, relative */
+    float rise_sd_per_k;
     /* one was found colder than anything known explains */
     uint16_t stepped_turns; /* of all springs: for so many more it counts as lately */
     uint8_t stepped_spring;

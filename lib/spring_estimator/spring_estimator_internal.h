@@ -137,6 +137,9 @@ void spring_alloy_sees(spring_estimator_t *estimator, bool other_way);
 /* By all that were seen so far the other way is an intermediate phase's; else it is a temperature's
  * or a contact's. */
 bool spring_alloy_has_r_phase(const spring_estimator_t *estimator);
+/* A spring that was austenite for certain has read so much more for a kelvin, relative: so do all
+ * of its alloy. */
+void spring_alloy_shows_rise(spring_estimator_t *estimator, float rise_per_k, float variance);
 
 /* What is believed of a spring, or shared, is as it was sealed: before it is used in a turn, and
  * before a change of it is sealed, as else what has changed by itself would count as right.
@@ -172,7 +175,7 @@ float spring_read_tolerance(const spring_belief_t *belief);
 void spring_learn_austenite(spring_belief_t *belief);
 
 /* A hold begins. Now: what the last turn read is what it reads with the phase that it has. */
-void spring_begin_hold_line(spring_belief_t *belief, bool now);
+void spring_begin_hold_line(const spring_estimator_t *estimator, spring_belief_t *belief, bool now);
 /* Even the coldest and heaviest spring has transformed by the heat of this heating. */
 bool spring_heated_enough(const spring_estimator_t *estimator, const spring_belief_t *belief,
                           const thermal_model_t *model, uint8_t spring);

@@ -149,14 +149,12 @@ static void tell_slope(spring_line_t *line, float left)
     line->rise_sd_per_k = sqrtf(prior * (1.0f - gain * way_k));
 }
 
-void spring_begin_hold_line(spring_belief_t *b, bool now)
+void spring_begin_hold_line(const spring_estimator_t *e, spring_belief_t *b, bool now)
 {
     b->trial = false;
-    /* any slope in print: no phase's coefficient tells the other's */
     b->run.line = (spring_line_t){
-        .rise_per_k = 0.5f * (COEFFICIENT_MOST_PER_K + COEFFICIENT_IN_PRINT_PER_K),
-        .rise_sd_per_k = 0.5f * (COEFFICIENT_MOST_PER_K - COEFFICIENT_IN_PRINT_PER_K) /
-                         SPRING_ESTIMATOR_BOUND_SDS,
+        .rise_per_k = e->rise_per_k,
+        .rise_sd_per_k = e->rise_sd_per_k,
     };
     if (now) {
         average_anew(b);
@@ -264,6 +262,18 @@ static float has_left(const spring_belief_t *b)
     return b->slow_ohm / (line->ohm * (1.0f + line->rise_per_k * line->slow_k)) - 1.0f;
 }
 
+/* Surely austenite: how what it reads has gone with its way is its alloy's. */
+static void show_rise(spring_estimator_t *e, const spring_belief_t *b, const thermal_model_t *model,
+                      uint8_t k, float noise2)
+{
+    const spring_line_t *line = &b->run.line;
+    if (spring_estimator_distance_k(e, model, k).low > 0.0f) {
+        const float per_k = 1.0f / line->slow_k;
+        spring_alloy_shows_rise(e, (b->slow_ohm / line->ohm - 1.0f) * per_k,
+                                noise2 * per_k * per_k);
+    }
+}
+
 /* A phase that is kept changes the resistance no faster than temperature does. */
 void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                           uint8_t k, float moved_k, float share)
@@ -320,9 +330,11 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
     if (changed2 < suspected2) {
         b->losing = 0;
         const bool rests = b->quiet >= SPRING_ESTIMATOR_REST_TURNS;
-        const bool away = fabsf(line->slow_k) > ANCHOR_K;
-        if (b->rough &&
-            (rests || b->averaged == ANCHOR_TURNS || (b->averaged > ANCHOR_TURNS && away))) {
+        const bool away = b->averaged > ANCHOR_TURNS && fabsf(line->slow_k) > ANCHOR_K;
+        if (b->rough && (rests || b->averaged == ANCHOR_TURNS || away)) {
+            if (away) {
+                show_rise(e, b, model, k, noise2);
+            }
             begin_line(b, !rests, share); /* a coefficient explains only the way since */
         }
         if (rests) {

@@ -730,7 +730,7 @@ TEST(what_may_be_no_lost_phase_is_tried)
         }
     }
     INSIDE.trial = true;
-    spring_begin_hold_line(&INSIDE, false);
+    spring_begin_hold_line(&estimator, &INSIDE, false);
     TEST_ASSERT_FALSE(spring_estimator_on_trial(&INSIDE));
 }
 
@@ -941,6 +941,49 @@ TEST(line_begins_at_rest_or_with_eight_turns)
     NEAR(0.25 * (1.0 + 0.001 * (double)INSIDE.run.line.way_k), INSIDE.slow_ohm);
     TEST_ASSERT_EQUAL_FLOAT(INSIDE.run.line.way_k, INSIDE.run.line.slow_k);
     TEST_ASSERT_TRUE(INSIDE.run.line.slow_k > 1.9f);
+}
+
+/* Each 3 K on the way of certain austenite tell what a kelvin adds to it, but for the first turns,
+ * which are few: to all springs of its alloy, which differ. The next hold's line begins with it. */
+TEST(way_of_certain_austenite_tells_the_slope_of_all)
+{
+    static const struct {
+        double c, slow_k;
+        uint8_t averaged;
+        bool rough, tells;
+    } table[] = {
+        {95.0, -4.0, 16, true, true},  {95.0, 4.0, 16, true, true},  {95.0, -3.1, 9, true, true},
+        {95.0, -2.9, 16, true, false}, {95.0, -4.0, 8, true, false}, {95.0, -4.0, 16, false, false},
+        {79.0, -4.0, 16, true, false},
+    };
+    const double prior_sd = 0.0009 / 2.6, own = 0.00015;
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_line_at(0.25 * (1.0 + 0.001 * table[n].slow_k));
+        row(n);
+        spring_begin_alloy(&estimator);
+        put(table[n].c);
+        INSIDE.quiet = 20;
+        INSIDE.averaged = table[n].averaged;
+        INSIDE.rough = table[n].rough;
+        INSIDE.run.line.rise_per_k = 0.001f;
+        INSIDE.run.line.way_k = INSIDE.run.line.slow_k = (float)table[n].slow_k;
+        INSIDE.run.line.variance = 2e-7f;
+        const double sample = (2.5e-7 + 2e-7) / pow(table[n].slow_k, 2);
+        const double gain =
+            table[n].tells ? pow(prior_sd, 2) / (pow(prior_sd, 2) + sample + own * own) : 0.0;
+        spring_holding_watch(&estimator, &INSIDE, &model, 0, 0.0f, 0.0625f);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, INSIDE.lost);
+        NEAR(1e3 * (0.0006 + gain * 0.0004), 1e3f * estimator.rise_per_k);
+        NEAR(1e3 * prior_sd * sqrt(1.0 - gain), 1e3f * estimator.rise_sd_per_k);
+        spring_begin_hold_line(&estimator, &INSIDE, false);
+        TEST_ASSERT_EQUAL_FLOAT(estimator.rise_per_k, INSIDE.run.line.rise_per_k);
+        TEST_ASSERT_EQUAL_FLOAT(estimator.rise_sd_per_k, INSIDE.run.line.rise_sd_per_k);
+    }
+    for (int n = 0; n < 50; n++) {
+        spring_alloy_shows_rise(&estimator, 0.002f, 0.0f);
+    }
+    NEAR(1e3 * 0.0015, 1e3f * estimator.rise_per_k); /* none is steeper */
+    NEAR(1e3 * own, 1e3f * estimator.rise_sd_per_k);
 }
 
 /* What is slower than a turn: second differences of averages 4 s apart, at rest. */
