@@ -117,6 +117,10 @@ void spring_keep_above(spring_estimator_t *estimator, spring_belief_t *belief,
  * of both are opened to it, so that what is seen from here on tells how much of it lasts: true. */
 bool spring_open_to_step(spring_estimator_t *estimator, spring_belief_t *belief, uint8_t spring,
                          float error_k, float sd_k);
+/* By keeping its phase it has come to give off less than is likely, and less than the other held
+ * springs have on average since they were seen: no surroundings do that to one. O(springs). */
+bool spring_keeps_alone(const spring_estimator_t *estimator, const spring_belief_t *belief,
+                        uint8_t spring);
 
 /* What springs of one wire have in common: nothing is known of it yet. */
 void spring_begin_alloy(spring_estimator_t *estimator);

@@ -30,6 +30,27 @@ bool spring_open_to_step(spring_estimator_t *e, spring_belief_t *b, uint8_t k, f
     return opens;
 }
 
+bool spring_keeps_alone(const spring_estimator_t *e, const spring_belief_t *b, uint8_t k)
+{
+    const float bound2 = SPRING_ESTIMATOR_BOUND_SDS * SPRING_ESTIMATOR_BOUND_SDS * b->loss_variance;
+    if (b->kept_w_per_k * b->kept_w_per_k <= bound2) {
+        return false; /* as a rule: the others need not be asked */
+    }
+    float sum_w_per_k = 0.0f;
+    uint8_t others = 0;
+    for (uint8_t i = 0; i < e->springs; i++) {
+        const spring_belief_t *other = &e->spring[i];
+        if (i != k && !other->heating && other->possible == SPRING_PHASE_AUSTENITE &&
+            spring_estimator_sees(other)) {
+            sum_w_per_k += other->kept_w_per_k;
+            others++;
+        }
+    }
+    const float common_w_per_k = others == 0 ? 0.0f : sum_w_per_k / (float)others;
+    const float own_w_per_k = b->kept_w_per_k - common_w_per_k;
+    return own_w_per_k * b->kept_w_per_k > 0.0f && own_w_per_k * own_w_per_k > bound2;
+}
+
 bool spring_estimator_losses(const spring_estimator_t *e, float *factor, float *sd)
 {
     float weights = 0.0f, sum = 0.0f, squares = 0.0f;

@@ -229,6 +229,45 @@ TEST(two_springs_that_are_found_colder_are_a_step)
     }
 }
 
+/* What it gives off less by keeping its phase, 4 sd of it, is its own but for what the others that
+ * are held and read do, on average: a draught ends for all. */
+TEST(what_all_springs_keep_is_the_surroundings)
+{
+    static const struct {
+        float kept, others[2]; /* standard deviations of its loss */
+        bool heating, blind, between;
+        bool alone;
+    } table[] = {
+        {-4.0f, {0.0f, 0.0f}, false, false, false, true},
+        {-2.5f, {0.0f, 0.0f}, false, false, false, false},
+        {-4.0f, {-2.0f, -1.0f}, false, false, false, false},
+        {-4.0f, {-2.0f, -0.7f}, false, false, false, true},
+        {-4.0f, {-2.0f, -18.0f}, false, false, false, false}, /* less than they */
+        {-2.5f, {1.0f, 1.0f}, false, false, false, false},    /* within what is likely */
+        {-4.0f, {1.0f, -8.0f}, true, false, false, true},     /* the second is not held, */
+        {-4.0f, {1.0f, -8.0f}, false, true, false, true},     /* reads nothing, */
+        {-4.0f, {1.0f, -8.0f}, false, false, true, true},     /* or may have lost its phase */
+        {-4.0f, {-2.0f, -8.0f}, true, false, false, false},
+        {4.0f, {-2.0f, -2.0f}, false, false, false, true},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_three();
+        row(n);
+        for (uint8_t k = 0; k < SPRINGS; k++) {
+            spring_belief_t *const b = &estimator.spring[k];
+            b->possible = SPRING_PHASE_AUSTENITE;
+            b->reads = true;
+            b->fresh = 9;
+            b->loss_variance = 1e-8f;
+            b->kept_w_per_k = 1e-4f * (k == 0 ? table[n].kept : table[n].others[k - 1]);
+        }
+        estimator.spring[2].heating = table[n].heating;
+        estimator.spring[2].blind = table[n].blind;
+        estimator.spring[2].possible |= table[n].between ? SPRING_PHASE_BETWEEN : 0;
+        TEST_ASSERT_EQUAL(table[n].alone, spring_keeps_alone(&estimator, &estimator.spring[0], 0));
+    }
+}
+
 /* A spring is found at 88 degC where 98 were believed: any other in its first heating is taken to
  * be off by half as much, as it is as far above the room. */
 TEST(first_heating_is_moved_by_half_of_what_another_has_shown)
