@@ -12,13 +12,16 @@
 #define SLOW_BEND_TO_SD  0.68f
 #define SLOW_NOISE_SHARE ((float)SLOW_TURNS * LINE_SHARE) /* as the line follows */
 #define ANCHOR_K         3.0f /* 0.45 % of the resistance by the largest coefficient */
-#define SUSPECTED        0.6f /* of what is sure: 3 of 5 */
-#define OTHER_WAY        2.0f /* times as much: an intermediate phase, where drifts go either way */
-#define LASTING_TURNS    60   /* 15 s of suspicion are as sure */
-#define CROSSING_SD_K    1.0f
-#define APART_PER_A      0.5f    /* between two currents, as of 3 and 1.2 A */
-#define OFFSET_LEAST_V   0.0005f /* what a turn's steps of 4 mV leave, and its noise */
-#define OFFSET_SDS       3.0f
+/* Of its temperature, by steps of the surroundings in 60 s: 12 K, by a fifth of the loss, once in a
+ * quarter of an hour. */
+#define STEPS_K        3.0f
+#define SUSPECTED      0.6f /* of what is sure: 3 of 5 */
+#define OTHER_WAY      2.0f /* times as much: an intermediate phase, where drifts go either way */
+#define LASTING_TURNS  60   /* 15 s of suspicion are as sure */
+#define CROSSING_SD_K  1.0f
+#define APART_PER_A    0.5f    /* between two currents, as of 3 and 1.2 A */
+#define OFFSET_LEAST_V 0.0005f /* what a turn's steps of 4 mV leave, and its noise */
+#define OFFSET_SDS     3.0f
 /* Of an average: so little phase may be lost unseen, and it tells anew in 2 x 16 turns. */
 #define LINE_VARIANCE (32.0f * LOSS_LEAST * LOSS_LEAST)
 #define STILL_K       0.5f  /* below where it would be seen */
@@ -162,16 +165,36 @@ void spring_begin_hold_line(const spring_estimator_t *e, spring_belief_t *b, boo
     }
 }
 
-/* And at rest the line follows what it reads. */
-static void follow(spring_belief_t *b, float left)
+/* What of its slope is more than its sd: one that was never seen moves nothing. */
+static float sure_rise_per_k(const spring_line_t *line)
 {
-    if (fabsf(b->run.line.slow_k) > CROSSING_SD_K && fabsf(left) < LOSS_LEAST) {
-        tell_slope(&b->run.line, left);
+    const float unsure = line->rise_sd_per_k;
+    return line->rise_per_k - spring_clamp(line->rise_per_k, -unsure, unsure);
+}
+
+/* At rest the line follows what it reads, and its temperature: as far as its slope makes an unseen
+ * step of the surroundings likelier than a sensor or a contact that drifts. It grows no surer. */
+static void follow(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
+                   float left, float noise2)
+{
+    spring_line_t *line = &b->run.line;
+    if (fabsf(line->slow_k) > CROSSING_SD_K && fabsf(left) < LOSS_LEAST) {
+        tell_slope(line, left);
     }
-    b->run.line.ohm += b->run.line.ohm * left * LINE_SHARE;
-    b->run.line.way_k -= b->run.line.slow_k * LINE_SHARE;
-    b->run.line.slow_k -= b->run.line.slow_k * LINE_SHARE;
-    b->run.line.variance -= 2.0f * b->run.line.variance * LINE_SHARE;
+    const float step = sure_rise_per_k(line) * STEPS_K;
+    const float by_step = step / (step * step + noise2);
+    line->ohm += line->ohm * left * (1.0f - by_step * step) * LINE_SHARE;
+    line->way_k -= line->slow_k * LINE_SHARE;
+    line->slow_k -= line->slow_k * LINE_SHARE;
+    line->variance -= 2.0f * line->variance * LINE_SHARE;
+    if (line->turns != 0 && line->turns % SLOW_TURNS == 0) { /* a turn's is below a model's step */
+        const float hotter_k = by_step * STEPS_K * left * SLOW_NOISE_SHARE;
+        spring_correct_loss(e, b, b->covariance / spring_distance_k2(b) * hotter_k);
+        spring_set_temperature(model, k, spring_now_c(model, k) + hotter_k, SPRING_PHASE_AUSTENITE);
+        b->last_c7 = thermal_model_temperature_c7(model, k);
+        line->way_k += hotter_k;
+        line->slow_k += hotter_k;
+    }
 }
 
 static bool is_other_way(const spring_belief_t *b, float left)
@@ -338,7 +361,7 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
             begin_line(b, !rests, share); /* a coefficient explains only the way since */
         }
         if (rests) {
-            follow(b, left);
+            follow(e, b, model, k, left, fmaxf(noise2, LOSS_LEAST * LOSS_LEAST));
         }
         if (b->trial && is_other_way(b, left) && changed > LOSS_LEAST) {
             begin_line(b, true, share); /* what creeps hides no loss from here */

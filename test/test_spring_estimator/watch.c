@@ -834,6 +834,43 @@ TEST(line_follows_what_keeps_its_phase)
     }
 }
 
+/* Where its slope is known, by more than its sd, what it leaves its line by at rest tells each 4 s
+ * that it is hotter or colder, and loses less or more: the less, the more its readings wander. The
+ * line follows by the rest. */
+TEST(what_a_known_slope_reads_is_a_temperature)
+{
+    static const struct {
+        double more, rise, sd, slow_noise;
+        uint16_t turns;
+        bool tells;
+    } table[] = {
+        {0.0008, 0.001, 2e-4, 0.0005, 15, true},   {-0.0008, 0.001, 2e-4, 0.0005, 31, true},
+        {0.0008, -0.001, 2e-4, 0.0005, 15, true},  {0.0008, 0.001, 2e-4, 0.004, 15, true},
+        {0.0008, 0.0006, 7e-4, 0.0005, 15, false}, {0.0008, 0.001, 2e-4, 0.0005, 14, false},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_line_at(0.25 * (1.0 + table[n].more));
+        row(n);
+        put(95.0);
+        INSIDE.quiet = 40;
+        INSIDE.learnt.slow_noise = (float)table[n].slow_noise;
+        INSIDE.run.line.rise_per_k = (float)table[n].rise;
+        INSIDE.run.line.rise_sd_per_k = (float)table[n].sd;
+        INSIDE.run.line.turns = table[n].turns;
+        const double sure = fmax(fabs(table[n].rise) - table[n].sd, 0.0);
+        const double step = 3.0 * (table[n].rise < 0.0 ? -sure : sure);
+        const double noise = fmax(table[n].slow_noise, 0.0012);
+        const double per_step = step / (step * step + noise * noise);
+        const double hotter_k = table[n].tells ? per_step * 3.0 * table[n].more / 15.0 : 0.0;
+        spring_holding_watch(&estimator, &INSIDE, &model, 0, 0.0f, 0.0625f);
+        TEST_ASSERT_FLOAT_WITHIN(0.008f, (float)(95.0 + hotter_k), spring_now_c(&model, 0));
+        NEAR(1e6 * -1e-4 * hotter_k, 1e6f * INSIDE.learnt.loss_w_per_k);
+        NEAR(hotter_k, INSIDE.run.line.way_k);
+        NEAR(hotter_k, INSIDE.run.line.slow_k);
+        NEAR(0.25 * (1.0 + table[n].more * (1.0 - per_step * step) / 240.0), INSIDE.run.line.ohm);
+    }
+}
+
 /* As the current drops the spring is what it was: what reads otherwise is the sensor's offset. */
 TEST(drop_of_the_current_tells_the_offset)
 {
