@@ -207,7 +207,7 @@ TEST(a_dither_across_the_limit_is_no_reheat)
 
 /* Each spring of one array has something else: capacity, loss and transformation as far off as is
  * tolerated; coefficients in print, whatever the change; a contact that steps or ages; a noise that
- * stays for a second. None of that is lost phase: it is heated for it twice at the most, and has
+ * stays for a second. None of that is lost phase: it is heated for it thrice at the most, and has
  * lost none. */
 TEST(springs_are_within_their_bounds_and_nothing_else_is_taken_for_lost_phase)
 {
@@ -250,7 +250,7 @@ TEST(springs_are_within_their_bounds_and_nothing_else_is_taken_for_lost_phase)
         const score_spring_t *spring = &result.score.spring[k];
         row((size_t)k);
         TEST_ASSERT_TRUE(spring->lowest_held > SCORE_LOST);
-        TEST_ASSERT_LESS_OR_EQUAL_INT(2, spring->false_losses);
+        TEST_ASSERT_LESS_OR_EQUAL_INT(3, spring->false_losses);
         known_s += spring->known_s;
         inside_s += spring->inside_s;
     }
