@@ -44,11 +44,6 @@ SPRINT = 5
 MAX_EFFECTS = 4
 
 
-def bendable(candidate: Candidate) -> bool:
-    """Return whether a candidate follows anything slow: one number alone, as of where the room of the only run is, does not."""
-    return candidate.flexible and len(candidate.free) > 1
-
-
 @dataclass
 class Search:
     """State of one search: every fit made, by its effects."""
@@ -242,7 +237,7 @@ class Search:
     def is_flexible(self, fit: Fit, effect: str) -> bool:
         """Return whether a fit has an effect in a variant that follows anything slow."""
         one = self.candidate_of(fit, effect)
-        return one is not None and bendable(one)
+        return one is not None and one.flexible
 
     def handicap(self, one: Fit, other: Fit) -> float:
         """Return the nats by which `one` must be ahead: TOLD_APART where it alone has a flexible cause, and the other
@@ -250,7 +245,7 @@ class Search:
 
         Negative the other way round; 0 where both have that effect, bent or not.
         """
-        flexible = {c.effect for c in self.candidates if bendable(c)}
+        flexible = {c.effect for c in self.candidates if c.flexible}
         shared = flexible & set(one.spec.effects) & set(other.spec.effects)
         bends = [
             any(self.is_flexible(fit, effect) for effect in fit.spec.effects if effect not in shared)
@@ -395,7 +390,7 @@ class Search:
             for drop, k, sizes in forecasts:
                 name = screen.candidates[k].effect
                 # where something flexible took up something slow, a linear forecast says too little of a slow node
-                slow = own is not None and bendable(own) and screen.candidates[k].slow_node
+                slow = own is not None and own.flexible and screen.candidates[k].slow_node
                 if name in seen or (not slow and (len(seen) >= most or drop < 0.5 * needed)) or not self.goes_on():
                     continue
                 seen.add(name)
@@ -439,7 +434,7 @@ class Search:
             for _, chosen in beam:
                 there = {screen.candidates[k].effect for k in chosen}
                 for k, one in enumerate(screen.candidates):
-                    if one.effect in there or bendable(one) or (more := chosen | {k}) in grown:
+                    if one.effect in there or one.flexible or (more := chosen | {k}) in grown:
                         continue
                     drop, _ = screen.forecast(sorted(more))
                     price = sum(numbers[j] for j in more) * 0.5 * math.log(fit.count) + self.price(len(more))

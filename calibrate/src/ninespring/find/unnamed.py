@@ -26,7 +26,7 @@ from . import evidence
 from . import windows as windows_of
 from .causes import SHORTEST, Cause, bump, column_of, library, thinned, typical_power
 from .evidence import fit_factor, unexplained
-from .search import MIN_GAIN, MIN_SHARE, Search, bendable
+from .search import MIN_GAIN, MIN_SHARE, Search
 
 KINDS = 500
 """Of causes that there are to choose from, at all places and times, about so many that differ."""
@@ -357,7 +357,7 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
 def _named(problem: Problem, first: Search, fit: Fit) -> list[Cause]:
     """Return what the library's own candidates would add to the readings around a fit: a name goes before what has none."""
     screen = Search(problem, first.candidates, first.base).screen(fit)
-    kept = [k for k, owner in enumerate(screen.owner) if not bendable(screen.candidates[owner])]
+    kept = [k for k, owner in enumerate(screen.owner) if not screen.candidates[owner].flexible]
     columns = thinned(problem, screen.directions[:, kept])
     return [Cause(NAMED, screen.candidates[screen.owner[k]].effect, (), columns[:, [j]]) for j, k in enumerate(kept)]
 
@@ -481,7 +481,7 @@ def _beside(problem: Problem, first: Search, hidden: Sequence[Hidden]) -> Search
     """
     base = problem.fit(first.base.spec, first.base.as_dict(), errors=True)
     stays = any(one.cause.bumps for one in hidden) and any(run.ambient_c is not None for run in problem.runs)
-    rest = [one for one in first.candidates if not (stays and bendable(one) and one.effect not in RUNS_OWN)]
+    rest = [one for one in first.candidates if not (stays and one.flexible and one.effect not in RUNS_OWN)]
     return Search(problem, rest, base, first.progress)
 
 

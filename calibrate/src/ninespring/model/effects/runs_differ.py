@@ -28,8 +28,8 @@ def _each_run(scene: Scene, key: str, shows: bool) -> Iterator[Candidate]:
     free = tuple(_number(key, r) for r in range(scene.runs))
     still, moved = (1.0, 1.05) if key == DRIVE_GAIN else (0.0, 1.0)
     probes = tuple({f.key: moved if f is one else still for f in free} for one in free)
-    # flexible: what is the array's own, and the same in all runs, comes first
-    yield Candidate("each run its own", free, probes, signed=True, most=10.0, neutral=still, flexible=True)
+    # flexible: what is the array's own, and the same in all runs, comes first; the room of the only run is one number
+    yield Candidate("each run its own", free, probes, signed=True, most=10.0, neutral=still, flexible=scene.runs > 1)
 
 
 def _gains(numbers: Numbers, variant: str) -> str:
