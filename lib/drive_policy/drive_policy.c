@@ -34,6 +34,7 @@
 #define LOWER_MA            800u  /* the least at which a resistance tells the phase */
 #define TRIAL_K_PER_S       1.0f  /* about as fast as it cools by itself */
 #define TRIAL_MA            650u  /* the least at which a hold is read */
+#define STALLS_K_PER_S      0.02f /* what is left of 10 K would take eight minutes */
 #define RISE_SHARE          0.25f /* of a turn in the average */
 
 #define WALK_MA     20                                 /* a tick, after a change of policy */
@@ -179,6 +180,14 @@ static bool is_limited(const drive_policy_t *policy, const drive_policy_input_t 
                thermal_model_transformation(in->model, k).austenite_finish_c7;
 }
 
+/* Its own limit leaves it where it is: it would wait there for ever. */
+static bool is_stalled(const drive_policy_spring_t *s)
+{
+    return (s->derating & DRIVE_POLICY_LIMIT_TEMPERATURE) != 0 &&
+           s->granted_ma >= s->ceiling_ma - (s->ceiling_ma >> 2) &&
+           fabsf(s->rise_k_per_s) < STALLS_K_PER_S;
+}
+
 static void heat(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k,
                  uint16_t level_permille)
 {
@@ -194,7 +203,7 @@ static void heat(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
     s->wanted_ma = boost_ma;
     const bool full = is_full(level_permille);
     const float level = 0.001f * (float)level_permille;
-    if (is_limited(policy, in, k) ||
+    if (is_limited(policy, in, k) || is_stalled(s) ||
         (full ? spring_estimator_has_transformed(in->belief, in->model, k)
               : phase_of(in, k) >= level)) {
         enter(policy, in, k, DRIVE_POLICY_STAGE_HOLD, level_permille);

@@ -566,7 +566,9 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
                                  bool full)
 {
     spring_belief_t *b = &e->spring[k];
-    const float now_c = spring_now_c(model, k);
+    /* neither has it come to its finish, nor is that seen */
+    const bool unproven = full && b->heating && !spring_estimator_has_transformed(e, model, k) &&
+                          !surely_finished(b, model, k, 0.0f);
     const bool lacks =
         full && b->possible != SPRING_PHASE_AUSTENITE && spring_estimator_lacks_phase(b, model, k);
     const float phase = lacks ? spring_phase_by_resistance(b) : 1.0f; /* as it read last */
@@ -575,7 +577,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {
         b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE;
         b->possible = SPRING_PHASE_AUSTENITE;
-        spring_set_temperature(model, k, now_c, SPRING_PHASE_AUSTENITE);
+        spring_set_temperature(model, k, spring_now_c(model, k), SPRING_PHASE_AUSTENITE);
     } else if (!full && b->possible == SPRING_PHASE_AUSTENITE) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
     }
@@ -590,7 +592,8 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
         b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
     }
-    b->heating = b->left = b->unproven = false;
+    b->heating = b->left = false;
+    b->unproven = unproven;
     b->kept_w_per_k = 0.0f;
     b->lost = b->doubted ? 1.0f - phase : 0.0f;
     b->quiet = 0;

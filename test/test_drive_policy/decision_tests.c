@@ -265,6 +265,33 @@ TEST(heating_ends_at_its_phase_or_where_a_limit_ends_it)
     }
 }
 
+/* Its own temperature leaves it less than the boost, it has had three quarters of that, and warms
+ * by less than 0.02 K/s: it ends. */
+TEST(heating_that_its_limit_holds_where_it_is_ends)
+{
+    static const struct {
+        float rise_k_per_s;
+        uint16_t granted_ma, derating;
+        drive_policy_stage_t stage;
+    } table[] = {{0.019f, 1500, DRIVE_POLICY_LIMIT_TEMPERATURE, HOLD},
+                 {-0.019f, 1500, DRIVE_POLICY_LIMIT_TEMPERATURE, HOLD},
+                 {0.03f, 1500, DRIVE_POLICY_LIMIT_TEMPERATURE, HEAT},
+                 {0.0f, 1499, DRIVE_POLICY_LIMIT_TEMPERATURE, HEAT},
+                 {0.0f, 1500, DRIVE_POLICY_LIMIT_UNDRIVEN, HEAT}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin(1, 2);
+        believed(0, 92.0f, B, 0.5f);
+        stands(0, HEAT, 1000);
+        policy.spring[0].ceiling_ma = 2000;
+        policy.spring[0].granted_ma = table[n].granted_ma;
+        policy.spring[0].derating = table[n].derating;
+        policy.spring[0].rise_k_per_s = table[n].rise_k_per_s / 0.75f; /* it has not moved since */
+        turn_of(0);
+        row(n);
+        TEST_ASSERT_EQUAL(table[n].stage, drive_policy_stage(&policy, 0));
+    }
+}
+
 /* From 1 K below austenite start on a level is heated to with 0.4 W beyond what holds it. Who waits
  * for the supply keeps what it has, if that is half of its phase or 3 K above austenite start:
  * fully on not below its place. */
