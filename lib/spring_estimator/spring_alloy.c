@@ -37,6 +37,11 @@ void spring_alloy_shows_rise(spring_estimator_t *e, float rise_per_k, float vari
     e->rise_sd_per_k = fmaxf(sqrtf(prior * (1.0f - gain)), RISE_OWN_PER_K);
 }
 
+float spring_alloy_rise_sd_per_k(const spring_estimator_t *e)
+{
+    return sqrtf(e->rise_sd_per_k * e->rise_sd_per_k + RISE_OWN_PER_K * RISE_OWN_PER_K);
+}
+
 bool spring_alloy_has_r_phase(const spring_estimator_t *e)
 {
     return e->r_phase_odds >= 0.0f;

@@ -288,7 +288,7 @@ void spring_keep_above(spring_estimator_t *e, spring_belief_t *b, thermal_model_
         const float less_w_per_k = b->covariance / spring_distance_k2(b) * error_k;
         spring_correct_loss(e, b, less_w_per_k);
         b->kept_w_per_k += less_w_per_k;
-        if (!b->trial && spring_keeps_alone(e, b, k)) {
+        if (!b->trial && !b->hot && spring_keeps_alone(e, b, k)) {
             /* it hardly can lose so little: what is read may not be its phase. If it is, the loss
              * is right, and the declared one would overheat it: it stays. */
             b->blind = true;

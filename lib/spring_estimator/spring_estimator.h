@@ -94,9 +94,9 @@ typedef struct {
     /* the running turn's readings: each tick writes them, so they alone have no seal
      * (spring_seal.c) */
     uint8_t readings;
-    uint8_t settling; /* to be left out, after a jump of the current */
-    bool cut_short;   /* there was such a jump in the running turn */
-    bool left;        /* nothing is asked of it any more: the next turn ends what ran */
+    uint8_t settling;   /* to be left out, after a jump of the current */
+    bool cut_short : 1; /* there was such a jump in the running turn */
+    bool left : 1;      /* nothing is asked of it any more: the next turn ends what ran */
     uint16_t current_sum_ma;
     uint16_t voltage_sum_mv;
     /* the error of that temperature: variances of what the loss explains, and of the heat capacity
@@ -140,6 +140,7 @@ typedef struct {
     bool changes : 1;  /* so it does, whether its beginning was seen or not */
     bool told : 1;     /* it is martensite because someone said so */
     bool trial : 1;    /* held with less power, to tell what its resistance has changed by */
+    bool hot : 1;      /* in its hold it reads beyond what its austenite read when that was hot */
     bool unlike : 1;   /* this heating's martensite was not of the declared resistance */
     spring_learnt_t learnt;
 
@@ -187,9 +188,10 @@ typedef struct {
     float warms;        /* in a first heating, for a kelvin above ambient: more by so much */
     float rise_per_k;   /* what a kelvin adds to the resistance of its austenite, relative */
     float rise_sd_per_k;
-    /* one was found colder than anything known explains */
+    /* one was found colder, or read hotter, than anything known explains */
     uint16_t stepped_turns; /* of all springs: for so many more it counts as lately */
     uint8_t stepped_spring;
+    bool stepped_hotter;
     uint8_t broken_seals;   /* found so far, saturating: what was believed had changed by itself */
     spring_sights_t sights; /* for whoever asks why */
 } spring_estimator_t;

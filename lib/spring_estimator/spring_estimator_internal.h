@@ -111,6 +111,14 @@ void spring_correct_loss(const spring_estimator_t *estimator, spring_belief_t *b
 void spring_keep_above(spring_estimator_t *estimator, spring_belief_t *belief,
                        thermal_model_t *model, uint8_t spring, float limit_c);
 
+/* A spring was found colder, or reads hotter, than anything known explains: whether another one was
+ * so, the same way, lately. Then it is the surroundings that have changed; of one alone it may be a
+ * touch, or its contact. */
+bool spring_steps_with_others(spring_estimator_t *estimator, uint8_t spring, bool hotter);
+/* All springs that are held, three at least, read more than their austenite did when it was hot: no
+ * contacts do that, and an intermediate phase in none that keeps its own. They are hot. O(springs).
+ */
+bool spring_all_read_hot(const spring_estimator_t *estimator);
 /* It is found in error_k (below 0: colder), by a sight that is sure to sd_k. Where that is farther
  * off than all that was known of it explains, one spring alone may have been touched, or its
  * contact has moved; where another was found so lately, the surroundings have stepped: the losses
@@ -138,6 +146,8 @@ void spring_share_onset(spring_estimator_t *estimator, spring_belief_t *belief,
                         const thermal_model_t *model, uint8_t spring, float seen_c);
 /* A resistance has left its line for certain, the way of lost phase or the other one. */
 void spring_alloy_sees(spring_estimator_t *estimator, bool other_way);
+/* Standard deviation of that of one of its springs: what is unknown of the alloy, and its own. */
+float spring_alloy_rise_sd_per_k(const spring_estimator_t *estimator);
 /* By all that were seen so far the other way is an intermediate phase's; else it is a temperature's
  * or a contact's. */
 bool spring_alloy_has_r_phase(const spring_estimator_t *estimator);

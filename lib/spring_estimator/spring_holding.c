@@ -157,7 +157,7 @@ void spring_begin_hold_line(const spring_estimator_t *e, spring_belief_t *b, boo
     b->trial = false;
     b->run.line = (spring_line_t){
         .rise_per_k = e->rise_per_k,
-        .rise_sd_per_k = e->rise_sd_per_k,
+        .rise_sd_per_k = spring_alloy_rise_sd_per_k(e),
     };
     if (now) {
         average_anew(b);
@@ -172,6 +172,26 @@ static float sure_rise_per_k(const spring_line_t *line)
     return line->rise_per_k - spring_clamp(line->rise_per_k, -unsure, unsure);
 }
 
+/* Of what left its line, the part that an unseen step of the surroundings is likely to have made,
+ * as far as its slope is known, K; the rest is a sensor or a contact that drifts. */
+static float by_step_k(const spring_line_t *line, float left, float noise2)
+{
+    const float step = sure_rise_per_k(line) * STEPS_K;
+    return step / (step * step + noise2) * STEPS_K * left;
+}
+
+/* It is hotter by so much, and gives off less. */
+static void warm(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
+                 float hotter_k)
+{
+    spring_line_t *line = &b->run.line;
+    spring_correct_loss(e, b, b->covariance / spring_distance_k2(b) * hotter_k);
+    spring_set_temperature(model, k, spring_now_c(model, k) + hotter_k, SPRING_PHASE_AUSTENITE);
+    b->last_c7 = thermal_model_temperature_c7(model, k);
+    line->way_k += hotter_k;
+    line->slow_k += hotter_k;
+}
+
 /* At rest the line follows what it reads, and its temperature: as far as its slope makes an unseen
  * step of the surroundings likelier than a sensor or a contact that drifts. It grows no surer. */
 static void follow(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
@@ -181,19 +201,13 @@ static void follow(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *m
     if (fabsf(line->slow_k) > CROSSING_SD_K && fabsf(left) < LOSS_LEAST) {
         tell_slope(line, left);
     }
-    const float step = sure_rise_per_k(line) * STEPS_K;
-    const float by_step = step / (step * step + noise2);
-    line->ohm += line->ohm * left * (1.0f - by_step * step) * LINE_SHARE;
+    const float hotter_k = by_step_k(line, left, noise2);
+    line->ohm += line->ohm * (left - sure_rise_per_k(line) * hotter_k) * LINE_SHARE;
     line->way_k -= line->slow_k * LINE_SHARE;
     line->slow_k -= line->slow_k * LINE_SHARE;
     line->variance -= 2.0f * line->variance * LINE_SHARE;
     if (line->turns != 0 && line->turns % SLOW_TURNS == 0) { /* a turn's is below a model's step */
-        const float hotter_k = by_step * STEPS_K * left * SLOW_NOISE_SHARE;
-        spring_correct_loss(e, b, b->covariance / spring_distance_k2(b) * hotter_k);
-        spring_set_temperature(model, k, spring_now_c(model, k) + hotter_k, SPRING_PHASE_AUSTENITE);
-        b->last_c7 = thermal_model_temperature_c7(model, k);
-        line->way_k += hotter_k;
-        line->slow_k += hotter_k;
+        warm(e, b, model, k, hotter_k * SLOW_NOISE_SHARE);
     }
 }
 
@@ -240,13 +254,28 @@ static bool reads_hot(const spring_belief_t *b, const thermal_model_t *model, ui
            spring_beyond_austenite(b, model, k, ohm) > spring_read_tolerance(b);
 }
 
+/* As all read hotter than what they read when they were hot, it is hotter than that: by no less
+ * than the largest coefficient makes of it. */
+static void keep_as_hot_as_all(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
+                               uint8_t k)
+{
+    b->hot = reads_hot(b, model, k);
+    if (b->hot && spring_all_read_hot(e)) {
+        const float beyond = spring_beyond_austenite(b, model, k, b->slow_ohm);
+        const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
+        spring_keep_above(e, b, model, k,
+                          spring_c(finish_c7) + beyond * (1.0f / COEFFICIENT_MOST_PER_K));
+    }
+}
+
 /* What is certain to have left its line need be no lost phase: a hotter spring reads otherwise, or
  * a contact that has crept, and what goes the other way may be an intermediate phase's. While the
  * spring may be hot, or may have come to where it loses phase, it is put on trial: with less power
  * what is lost goes on, what was heat goes back, and a contact does neither until phase is lost.
+ * Where it cannot have, and others read hotter as well, it is hotter.
  * Returns whether it was no sight of lost phase. */
-static bool is_tried(const spring_estimator_t *e, spring_belief_t *b, const thermal_model_t *model,
-                     uint8_t k, bool other_way, float share)
+static bool is_tried(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
+                     bool other_way, float share, float left, float noise2)
 {
     const float start_c = lost_at_c(model, k, 0.0f);
     const bool may_lose =
@@ -256,6 +285,9 @@ static bool is_tried(const spring_estimator_t *e, spring_belief_t *b, const ther
         return false;
     }
     b->trial = b->trial || hot || may_lose;
+    if (!b->trial && spring_steps_with_others(e, k, true)) {
+        warm(e, b, model, k, by_step_k(&b->run.line, left, noise2));
+    }
     b->run.line.trial_ohm = b->slow_ohm;
     begin_line(b, true, share);
     return true;
@@ -333,6 +365,7 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         b->losing = 0;
         return;
     }
+    keep_as_hot_as_all(e, b, model, k);
     const float left = has_left(b);
     const float distance_k2 = spring_distance_k2(b);
     const float changed = as_lost(b, left);
@@ -376,7 +409,7 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
     b->losing = b->losing < UINT8_MAX ? (uint8_t)(b->losing + 1) : UINT8_MAX;
     if (changed2 > sure2 || b->losing >= LASTING_TURNS) {
         const bool other_way = is_other_way(b, left);
-        if (is_tried(e, b, model, k, other_way, share)) {
+        if (is_tried(e, b, model, k, other_way, share, left, noise2)) {
             return;
         }
         spring_alloy_sees(e, other_way);

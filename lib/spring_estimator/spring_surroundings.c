@@ -4,30 +4,57 @@
 
 #define STEP_LASTS    0.8f  /* how much of such an error a step that lasts makes: a correlation */
 #define STEP_LATELY_S 60.0f /* a spring's time constant, C / G = 52 s */
+#define HOT_LEAST     3     /* contacts of two may have crept alike */
 
-bool spring_open_to_step(spring_estimator_t *e, spring_belief_t *b, uint8_t k, float error_k,
-                         float sd_k)
+bool spring_steps_with_others(spring_estimator_t *e, uint8_t k, bool hotter)
+{
+    const bool common =
+        e->stepped_turns > 0 && e->stepped_spring != k && e->stepped_hotter == hotter;
+    e->stepped_turns = (uint16_t)((STEP_LATELY_S / SPRING_ESTIMATOR_TURN_S) * (float)e->springs);
+    e->stepped_spring = k;
+    e->stepped_hotter = hotter;
+    return common;
+}
+
+/* In a frame of its own: inlined, avr-gcc 5.4 tears a pointer (test/board_code). */
+__attribute__((noinline)) bool spring_open_to_step(spring_estimator_t *e, spring_belief_t *b,
+                                                   uint8_t k, float error_k, float sd_k)
 {
     const float known_k2 = spring_distance_k2(b) + sd_k * sd_k;
     if (error_k >= 0.0f ||
         error_k * error_k < SPRING_ESTIMATOR_LIKELY_SDS * SPRING_ESTIMATOR_LIKELY_SDS * known_k2) {
         return false;
     }
-    const bool opens = e->stepped_turns > 0 && e->stepped_spring != k;
+    const uint8_t first = e->stepped_spring;
+    const bool opens = spring_steps_with_others(e, k, false);
     if (opens) {
         const float step_w_per_k = LOSS_TOLERANCE * e->loss_w_per_k;
-        spring_belief_t *other = &e->spring[e->stepped_spring];
-        if (spring_is_sound(e, e->stepped_spring)) { /* else its turn finds it so */
+        spring_belief_t *other = &e->spring[first];
+        if (spring_is_sound(e, first)) { /* else its turn finds it so */
             other->loss_variance = fmaxf(other->loss_variance, step_w_per_k * step_w_per_k);
-            spring_seal(e, e->stepped_spring);
+            spring_seal(e, first);
         }
         b->variance_k2 += error_k * error_k;
         b->covariance += STEP_LASTS * error_k * step_w_per_k;
         b->loss_variance += step_w_per_k * step_w_per_k;
     }
-    e->stepped_turns = (uint16_t)((STEP_LATELY_S / SPRING_ESTIMATOR_TURN_S) * (float)e->springs);
-    e->stepped_spring = k;
     return opens;
+}
+
+bool spring_all_read_hot(const spring_estimator_t *e)
+{
+    uint8_t hot = 0;
+    for (uint8_t i = 0; i < e->springs; i++) {
+        const spring_belief_t *b = &e->spring[i];
+        if (b->fresh != 0 && !b->heating && b->possible == SPRING_PHASE_AUSTENITE &&
+            spring_estimator_sees(b)) {
+            if (!b->hot) {
+                return false;
+            }
+            hot++;
+        }
+    }
+    return hot >= HOT_LEAST;
 }
 
 bool spring_keeps_alone(const spring_estimator_t *e, const spring_belief_t *b, uint8_t k)

@@ -493,7 +493,7 @@ TEST(hold_begins_by_what_its_heating_showed)
         NEAR(strong ? table[n].ohm : 0.0, INSIDE.run.line.ohm);
         NEAR(strong ? 0.002 * 0.002 * 1e6 : 0.0, 1e6f * INSIDE.run.line.variance);
         NEAR(0.0006, INSIDE.run.line.rise_per_k);
-        NEAR(0.0009 / 2.6, INSIDE.run.line.rise_sd_per_k);
+        NEAR(hypot(0.0009 / 2.6, 0.00015), INSIDE.run.line.rise_sd_per_k);
         TEST_ASSERT_EQUAL(table[n].full && table[n].possible != A,
                           thermal_model_austenite(&model, 0) == THERMAL_MODEL_AUSTENITE_FULL);
         const spring_sight_t *const sight = spring_sights_newest(sights_inside(&estimator), 0);

@@ -734,6 +734,48 @@ TEST(what_may_be_no_lost_phase_is_tried)
     TEST_ASSERT_FALSE(spring_estimator_on_trial(&INSIDE));
 }
 
+/* What reads hotter where it cannot have begun to lose phase, within a minute of another spring, is
+ * hotter: by the part that a step of 3 K would make of it by its slope, less the slope's sd. */
+TEST(springs_that_read_hotter_one_after_the_other_are)
+{
+    static const struct {
+        uint8_t first;
+        unsigned turns_between;
+        bool hotter, trial, warms;
+        double rise_per_k;
+    } table[] = {
+        {1, 0, true, false, true, 0.001},   {0, 0, true, false, false, 0.001},
+        {1, 719, true, false, true, 0.001}, {1, 720, true, false, false, 0.001},
+        {1, 0, false, false, false, 0.001}, {1, 0, true, true, false, 0.001},
+        {1, 0, true, false, false, 0.0002},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_line_at(0.2512);
+        row(n);
+        put(95.0);
+        INSIDE.learnt.slow_noise = 0.0f;
+        INSIDE.variance_k2 = 1.0f;
+        INSIDE.losing = 59;
+        INSIDE.trial = table[n].trial;
+        INSIDE.run.line.ohm = INSIDE.run.line.trial_ohm = 0.25f;
+        INSIDE.run.line.rise_per_k = (float)table[n].rise_per_k;
+        INSIDE.run.line.rise_sd_per_k = 0.0002f;
+        TEST_ASSERT_FALSE(spring_steps_with_others(&estimator, table[n].first, table[n].hotter));
+        const unsigned before = estimator.stepped_turns;
+        TEST_ASSERT_EQUAL_UINT(60 * 4 * estimator.springs, before);
+        const unsigned lately = before * table[n].turns_between / 720;
+        estimator.stepped_turns = (uint16_t)(before - lately);
+        spring_holding_watch(&estimator, &INSIDE, &model, 0, 0.0f, 0.0625f);
+        const double step = 3.0 * (table[n].rise_per_k - 0.0002), left = 0.0048;
+        const double noise2 = pow(0.18 * 1e-4, 2);
+        const double hotter_k = table[n].warms ? 3.0 * left * step / (step * step + noise2) : 0.0;
+        TEST_ASSERT_FLOAT_WITHIN(0.03f, (float)(95.0 + hotter_k), spring_now_c(&model, 0));
+        TEST_ASSERT_EQUAL(table[n].warms, INSIDE.learnt.loss_w_per_k < 0.0f);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, INSIDE.lost);
+        NEAR(0.2512, INSIDE.run.line.ohm);
+    }
+}
+
 /* On trial what goes the other way counts since it began, by 2.6 sd; what creeps moves the line, so
  * that it hides no loss; the spring is no colder than that lets it be, whatever its average lags
  * by, and gives up no loss for good. */
@@ -1014,7 +1056,8 @@ TEST(way_of_certain_austenite_tells_the_slope_of_all)
         NEAR(1e3 * prior_sd * sqrt(1.0 - gain), 1e3f * estimator.rise_sd_per_k);
         spring_begin_hold_line(&estimator, &INSIDE, false);
         TEST_ASSERT_EQUAL_FLOAT(estimator.rise_per_k, INSIDE.run.line.rise_per_k);
-        TEST_ASSERT_EQUAL_FLOAT(estimator.rise_sd_per_k, INSIDE.run.line.rise_sd_per_k);
+        NEAR(1e3 * hypot((double)estimator.rise_sd_per_k, own),
+             1e3f * INSIDE.run.line.rise_sd_per_k);
     }
     for (int n = 0; n < 50; n++) {
         spring_alloy_shows_rise(&estimator, 0.002f, 0.0f);
