@@ -272,7 +272,7 @@ static void keep_as_hot_as_all(spring_estimator_t *e, spring_belief_t *b, therma
  * a contact that has crept, and what goes the other way may be an intermediate phase's. While the
  * spring may be hot, or may have come to where it loses phase, it is put on trial: with less power
  * what is lost goes on, what was heat goes back, and a contact does neither until phase is lost.
- * Where it cannot have, and others read hotter as well, it is hotter.
+ * Where it cannot have, and others read hotter (or colder) as well, it is.
  * Returns whether it was no sight of lost phase. */
 static bool is_tried(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
                      bool other_way, float share, float left, float noise2)
@@ -285,8 +285,9 @@ static bool is_tried(spring_estimator_t *e, spring_belief_t *b, thermal_model_t 
         return false;
     }
     b->trial = b->trial || hot || may_lose;
-    if (!b->trial && spring_steps_with_others(e, k, true)) {
-        warm(e, b, model, k, by_step_k(&b->run.line, left, noise2));
+    const float hotter_k = by_step_k(&b->run.line, left, noise2);
+    if (!b->trial && hotter_k != 0.0f && spring_steps_with_others(e, k, hotter_k > 0.0f)) {
+        warm(e, b, model, k, hotter_k);
     }
     b->run.line.trial_ohm = b->slow_ohm;
     begin_line(b, true, share);

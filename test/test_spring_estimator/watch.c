@@ -747,7 +747,7 @@ TEST(springs_that_read_hotter_one_after_the_other_are)
         {1, 0, true, false, true, 0.001},   {0, 0, true, false, false, 0.001},
         {1, 719, true, false, true, 0.001}, {1, 720, true, false, false, 0.001},
         {1, 0, false, false, false, 0.001}, {1, 0, true, true, false, 0.001},
-        {1, 0, true, false, false, 0.0002},
+        {1, 0, true, false, false, 0.0002}, {1, 0, false, false, true, -0.001},
     };
     for (size_t n = 0; n < ROWS(table); n++) {
         begin_line_at(0.2512);
@@ -766,11 +766,13 @@ TEST(springs_that_read_hotter_one_after_the_other_are)
         const unsigned lately = before * table[n].turns_between / 720;
         estimator.stepped_turns = (uint16_t)(before - lately);
         spring_holding_watch(&estimator, &INSIDE, &model, 0, 0.0f, 0.0625f);
-        const double step = 3.0 * (table[n].rise_per_k - 0.0002), left = 0.0048;
+        const double left = 0.0048;
+        const double step = 3.0 * copysign(fabs(table[n].rise_per_k) - 0.0002, table[n].rise_per_k);
         const double noise2 = pow(0.18 * 1e-4, 2);
         const double hotter_k = table[n].warms ? 3.0 * left * step / (step * step + noise2) : 0.0;
         TEST_ASSERT_FLOAT_WITHIN(0.03f, (float)(95.0 + hotter_k), spring_now_c(&model, 0));
-        TEST_ASSERT_EQUAL(table[n].warms, INSIDE.learnt.loss_w_per_k < 0.0f);
+        TEST_ASSERT_EQUAL(table[n].warms && hotter_k > 0.0, INSIDE.learnt.loss_w_per_k < 0.0f);
+        TEST_ASSERT_EQUAL(table[n].warms && hotter_k<0.0, INSIDE.learnt.loss_w_per_k> 0.0f);
         TEST_ASSERT_EQUAL_FLOAT(0.0f, INSIDE.lost);
         NEAR(0.2512, INSIDE.run.line.ohm);
     }
