@@ -20,11 +20,12 @@ void console_hint_setting(console_t *console, console_hint_t hint, uint16_t row,
     console->hint_element = element;
 }
 
-/* What the line's form was at fault for. */
+/* What the line's form was at fault for, or what the board lacks. */
 static void add_hint(const console_t *console, console_error_t error, text_line_t *line)
 {
     if (console->hint == CONSOLE_HINT_NONE ||
-        (error > CONSOLE_ERROR_OUT_OF_RANGE && error != CONSOLE_ERROR_UNKNOWN_SETTING)) {
+        (error > CONSOLE_ERROR_OUT_OF_RANGE && error != CONSOLE_ERROR_UNKNOWN_SETTING &&
+         error != CONSOLE_ERROR_NOT_AVAILABLE)) {
         return;
     }
     text_add_flash(line, FLASH_TEXT(": "));

@@ -30,7 +30,7 @@ extern "C" {
     X(INPUT_LOST, 13, "input_lost", "bytes were lost: nothing done; wait for ok between lines")    \
     X(SAVE_FAILED, 14, "save_failed",                                                              \
       "EEPROM does not keep what was written: it holds until power-off")                           \
-    X(NOT_AVAILABLE, 15, "not_available", "not in this version; help lists what is")               \
+    X(NOT_AVAILABLE, 15, "not_available", "not available on this board")                           \
     X(SPRINGS_ON, 16, "springs_on", "switch all springs off first")                                \
     X(SELFTEST_FAILED, 17, "selftest_failed", "selftest found the faults above")                   \
     X(SUPPLY_OFF, 18, "supply_off", "the supply is off; type clear and supply on")

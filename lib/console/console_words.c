@@ -26,6 +26,20 @@ static console_error_t parse_number(console_t *console, const char *text, const 
     return result == TEXT_NOT_A_NUMBER ? CONSOLE_ERROR_BAD_ARGUMENT : CONSOLE_ERROR_OUT_OF_RANGE;
 }
 
+/* As it is written: "50" or "50%". */
+static console_error_t parse_percent(console_t *console, const char *text, const char *range,
+                                     int32_t *value)
+{
+    char digits[8];
+    const size_t length = strlen(text);
+    if (length > 0 && length < sizeof digits && text[length - 1u] == '%') {
+        memcpy(digits, text, length);
+        digits[length - 1u] = '\0';
+        text = digits;
+    }
+    return parse_number(console, text, range, 0, 100, value);
+}
+
 static bool parse_on_off(const char *text, bool *on)
 {
     *on = flash_equal(text, FLASH_TEXT("on"));
@@ -76,8 +90,8 @@ static console_error_t switch_springs(console_t *console, const arguments_t *arg
     int32_t percent = on ? 100 : 0;
     console_error_t error = parse_springs(console, arguments->argument[0], &first, &last);
     if (error == CONSOLE_OK && arguments->count > 1) {
-        error = parse_number(console, arguments->argument[1],
-                             FLASH_TEXT("the level is #0 to #0 percent"), 0, 100, &percent);
+        error = parse_percent(console, arguments->argument[1],
+                              FLASH_TEXT("the level is #0 to #0 percent, whole"), &percent);
     }
     if (error == CONSOLE_OK && on) {
         error = may_drive(console);
@@ -158,8 +172,8 @@ static console_error_t word_fan(console_t *console, const arguments_t *arguments
 {
     int32_t percent = 0;
     const console_error_t error =
-        parse_number(console, arguments->argument[0], FLASH_TEXT("the fan is #0 to #0 percent"), 0,
-                     100, &percent);
+        parse_percent(console, arguments->argument[0],
+                      FLASH_TEXT("the fan is #0 to #0 percent, whole"), &percent);
     if (error == CONSOLE_OK) {
         controller_set_fan(console->controller, (uint8_t)percent);
     }
@@ -170,7 +184,15 @@ static console_error_t word_ambient(console_t *console, const arguments_t *argum
 {
     char name[SETTINGS_NAME_SIZE]; /* written out it would lie in RAM */
     settings_name(PARAMETER_ambient_c, 0, name);
-    return console_assign(console, name, arguments->argument[0]);
+    const console_error_t error = console_assign(console, name, arguments->argument[0]);
+    if (error == CONSOLE_OK && console->settings->board.ambient_source == SETTINGS_AMBIENT_NTC) {
+        console_out_t out;
+        console_out_start(&out);
+        text_add_flash(&out.line,
+                       FLASH_TEXT("[not now: the thermistor tells it, ambient_source=1]"));
+        console_out_end(console, &out);
+    }
+    return error;
 }
 
 static bool any_spring_on(const console_t *console)
@@ -250,6 +272,7 @@ static console_error_t word_supply(console_t *console, const arguments_t *argume
         return CONSOLE_ERROR_BAD_ARGUMENT;
     }
     if (!controller_supply_is_fitted(console->controller)) {
+        console_hint_text(console, FLASH_TEXT("by cut_off=0 no relay is fitted"), 0, 0);
         return CONSOLE_ERROR_NOT_AVAILABLE;
     }
     return controller_set_supply(console->controller, on) ? CONSOLE_OK : CONSOLE_ERROR_FAULT;

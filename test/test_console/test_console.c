@@ -264,8 +264,13 @@ TEST(every_refusal_says_what_would_be_right)
         {3, "version 2", ": write version\r\n"},
         {2, "on", "an argument is missing: write on K|all [0..100]\r\n"},
         {3, "on 1 2 3", ": write on K|all [0..100]\r\n"},
-        {5, "on 5 200", "a number is out of range: the level is 0 to 100 percent\r\n"},
-        {4, "on 5 x", "an argument is not of the right form: the level is 0 to 100 percent\r\n"},
+        {5, "on 5 200", "a number is out of range: the level is 0 to 100 percent, whole\r\n"},
+        {4, "on 5 x",
+         "an argument is not of the right form: the level is 0 to 100 percent, whole\r\n"},
+        {4, "on 5 33.5", ": the level is 0 to 100 percent, whole\r\n"},
+        {5, "on 5 101%", ": the level is 0 to 100 percent, whole\r\n"},
+        {4, "on 5 %", ": the level is 0 to 100 percent, whole\r\n"},
+        {4, "on 5 50%%", ": the level is 0 to 100 percent, whole\r\n"},
         {5, "on 10", "a number is out of range: springs are 1 to 9, or all\r\n"},
         {4, "on five", "an argument is not of the right form: springs are 1 to 9, or all\r\n"},
         {2, "off", ": write off K|all\r\n"},
@@ -284,8 +289,8 @@ TEST(every_refusal_says_what_would_be_right)
         {2, "policy", ": write policy open|precompensate\r\n"},
         {4, "policy closed", ": write policy open|precompensate\r\n"},
         {2, "fan", ": write fan 0..100\r\n"},
-        {5, "fan 101", ": the fan is 0 to 100 percent\r\n"},
-        {4, "fan on", ": the fan is 0 to 100 percent\r\n"},
+        {5, "fan 101", ": the fan is 0 to 100 percent, whole\r\n"},
+        {4, "fan on", ": the fan is 0 to 100 percent, whole\r\n"},
         {2, "ambient", ": write ambient C\r\n"},
         {5, "ambient 200", ": ambient_c is -40.00 to 85.00 degC\r\n"},
         {4, "ambient warm", ": ambient_c is -40.00 to 85.00 degC\r\n"},
@@ -625,6 +630,32 @@ TEST(a_fault_that_a_clear_leaves_says_for_how_long)
         TEST_ASSERT_EQUAL(n != 0, strstr(said, "mismatch: clear again in 5") != NULL);
         expect_ok("clear");
     }
+}
+
+TEST(a_level_is_as_good_with_its_percent_sign)
+{
+    expect_ok("on 5 40%");
+    TEST_ASSERT_EQUAL_UINT16(400, controller_level_permille(&controller, 4));
+    expect_ok("fan 70%");
+    TEST_ASSERT_EQUAL_UINT8(70, controller_fan_percent(&controller));
+}
+
+TEST(an_ambient_that_a_thermistor_overrules_says_so)
+{
+    expect_ok("ambient 25");
+    TEST_ASSERT_EQUAL_STRING("ok\r\n", said);
+    expect_ok("$ambient_source=1");
+    expect_ok("ambient 26");
+    expect_said("[not now: the thermistor tells it, ambient_source=1]\r\nok");
+    TEST_ASSERT_EQUAL_INT16(2600, settings.board.ambient_cc);
+}
+
+TEST(without_a_cut_off_the_supply_says_why_it_is_refused)
+{
+    expect_ok("$cut_off=0");
+    expect_error("supply off", CONSOLE_ERROR_NOT_AVAILABLE);
+    TEST_ASSERT_EQUAL_STRING(
+        "error:15 not available on this board: by cut_off=0 no relay is fitted\r\n", said);
 }
 
 TEST(status_says_whether_the_stages_have_their_supply)
