@@ -90,6 +90,14 @@ static bool was_found(const circuit_peer_t *own)
     return own->odd + (own->agreed == 0 ? 1u : 0u) >= CIRCUIT_PEERS_WINDOWS;
 }
 
+/* Within what a cable makes of it, whatever offsets make: else a window of few volts, which tells
+ * little, would acquit one who was found. */
+static bool is_like(const circuit_peer_t *own, float share, float others)
+{
+    const float own_part = (float)own->own_q12 / OWN_Q12;
+    return own->learnt == 0 || beyond(share, others * own_part, KNOWN_PART) <= 0.0f;
+}
+
 /* What a drop makes of a lower or higher share, as far as it is not known: it takes as much of both
  * voltages, and one more than is believed makes the share at fewer volts the lower one. */
 static float drop_mv(const circuit_source_t *source, bool is_lower, float expected_mv,
@@ -136,14 +144,16 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
                                                    other_mv));
         /* Where offsets make more than what a share may be at the most, it teaches nothing. */
         const float unsure_mv = alike ? 0.0f : source->unsure_mv;
-        if (!odd && own->learnt < LEARN_MOST && offsets_mv + unsure_mv <= OTHER_PART * told_mv) {
+        good = good && (!was_found(own) || is_like(own, share, others));
+        if (!odd && (good || !was_found(own)) && own->learnt < LEARN_MOST &&
+            offsets_mv + unsure_mv <= OTHER_PART * told_mv) {
             learn(own, share / others, told_mv / VOLTS_MV);
         }
     } else if (own->was_q7 != 0) {
         const float was = (float)own->was_q7 / SHARE_Q7;
         const float part = own->odd >= CIRCUIT_PEERS_WINDOWS - 1u ? KNOWN_PART : ALONE_PART;
         const float off_mv = beyond(share, was, part) * expected_mv - offsets_mv;
-        good = off_mv <= 0.0f;
+        good = off_mv <= (was_found(own) ? -offsets_mv : 0.0f);
         odd = off_mv > drop_mv(source, share < was, expected_mv, was_mv);
     }
     if (odd) {

@@ -50,11 +50,11 @@ typedef struct {
  * not known, by 18 % (its wiring, its gains); where fewer than CIRCUIT_PEERS_LEAST others are
  * driven, from what it showed before by 20 % (its supply may move), but by 5 % once it was found
  * and cleared. What is not known of the drop is let pass as far as volts differ, and acquits nobody
- * who was found. Its own share is the mean, by volts, of the first 255 windows that are not odd and
- * in which offsets make less than those 18 %, and stays: so a drift is found, however slow. The
- * others count each over its own share: a set that changes moves nothing. A window that tells
- * nothing, or of less than 0.1 V, is no witness for the others, and changes nothing else. springs
- * at most CIRCUIT_PEERS_MAX, spring below springs. */
+ * who was found; nor does a window that only offsets explain. Its own share is the mean, by volts,
+ * of the first 255 windows that are not odd and in which offsets make less than those 18 %, and
+ * stays: so a drift is found, however slow. The others count each over its own share: a set that
+ * changes moves nothing. A window that tells nothing, or of less than 0.1 V, is no witness for the
+ * others, and changes nothing else. springs at most CIRCUIT_PEERS_MAX, spring below springs. */
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t spring,
                          const circuit_window_t *window, const circuit_source_t *source);
 

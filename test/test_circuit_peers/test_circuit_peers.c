@@ -454,6 +454,37 @@ TEST(who_is_suspected_is_found_in_one_window_after_a_clear)
 }
 
 /* 0 is for who says nothing; more than 255 / 128 is as much. */
+/* 5 % beyond what a cable makes is 30 mV of 600, and 20 of 400, which offsets may make. */
+TEST(a_window_that_would_not_tell_a_lie_acquits_nobody_who_was_found)
+{
+    TEST_ASSERT_EQUAL_HEX(0, rounds(20, SPRINGS, 600.0f, 1.0f, 1.0f));
+    TEST_ASSERT_EQUAL_HEX(1, rounds(3, SPRINGS, 600.0f, 0.9f, 1.0f));
+    circuit_peers_clear(&peers, 0, true);
+    const uint8_t learnt = peers.spring[0].learnt;
+    for (unsigned n = 0; n < 10; n++) {
+        for (uint8_t k = 1; k < SPRINGS; k++) {
+            TEST_ASSERT_FALSE(takes(k, HOLDS_MV, 1.0f));
+        }
+        TEST_ASSERT_FALSE(takes(0, HEATS_MV, 0.9f));
+    }
+    TEST_ASSERT_EQUAL_UINT8(learnt, peers.spring[0].learnt);
+    for (uint8_t k = 1; k < SPRINGS; k++) {
+        TEST_ASSERT_FALSE(takes(k, 600.0f, 1.0f));
+    }
+    TEST_ASSERT_TRUE(takes(0, HEATS_MV, 0.9f));
+}
+
+/* One that shows again what it showed is acquitted: it takes three windows to be found anew. */
+TEST(who_shows_its_own_share_again_is_acquitted)
+{
+    TEST_ASSERT_EQUAL_HEX(0, rounds(20, SPRINGS, 600.0f, 1.0f, 1.0f));
+    TEST_ASSERT_EQUAL_HEX(1, rounds(3, SPRINGS, 600.0f, 0.8f, 1.0f));
+    circuit_peers_clear(&peers, 0, true);
+    TEST_ASSERT_EQUAL_HEX(0, rounds(1, SPRINGS, HOLDS_MV, 0.96f, 1.0f));
+    TEST_ASSERT_EQUAL_HEX(0, rounds(2, SPRINGS, 600.0f, 0.8f, 1.0f));
+    TEST_ASSERT_EQUAL_HEX(1, rounds(1, SPRINGS, 600.0f, 0.8f, 1.0f));
+}
+
 TEST(a_share_is_kept_to_the_nearest_128th)
 {
     static const float shares[][2] = {{0.0f, 1},     {0.4f, 1},     {1.4f, 1},
