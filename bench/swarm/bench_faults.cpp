@@ -25,7 +25,16 @@ constexpr unsigned OFF_SPRING = 4; /* the middle one; the others are driven */
 constexpr double SLICE_S = 0.02, HOTTER_K = 10.0;
 constexpr double QUIET_S = 20.0; /* before the user clears, three times */
 constexpr double AGAIN_S = 8.0;
-const char *const PATTERN = "pattern 111101111";
+
+/* Of all trials, beside the array's seed. */
+struct session {
+    std::string elf = ninespring::default_elf("firmware.elf");
+    std::uint64_t seed = 7;
+    double freewheel_v = 0.0, later_s = 0.0;
+    std::string pattern = "111101111";
+    std::vector<std::string> first; /* lines before it */
+    bool trace = false;
+};
 
 using events = std::vector<event>; /* at_s from the fault on */
 
@@ -150,6 +159,25 @@ events cuts_in_the_start(kind what)
     return all;
 }
 
+events flaps()
+{
+    events all;
+    for (double at_s = 0.0; at_s < 20.0; at_s += 0.6) {
+        all.push_back(at(at_s, kind::supply, 0, 0.5));
+        all.push_back(at(at_s + 0.3, kind::supply, 0, 5.0));
+    }
+    return all;
+}
+
+events climbs()
+{
+    events all;
+    for (double at_s = 0.0; at_s <= 20.0; at_s += 0.5) {
+        all.push_back(at(at_s, kind::supply, 0, 5.0 + 0.125 * at_s));
+    }
+    return all;
+}
+
 std::vector<injected> catalogue()
 {
     using k = kind;
@@ -163,6 +191,12 @@ std::vector<injected> catalogue()
         {"switch leaks 0.05 A", {at(0, k::leaks, 0, 0.05)}},
         {"switch leaks 0.3 A", {at(0, k::leaks, 0, 0.3)}},
         {"switch leaks 1 A", {at(0, k::leaks, 0, 1.0)}},
+        {"switch leaks 2.7 A", {at(0, k::leaks, 0, 2.7)}},
+        {"switch leaks 6.7 A", {at(0, k::leaks, 0, 6.7)}},
+        {"switch leaks 2.7 A, spring off", {at(0, k::leaks, off, 2.7)}},
+        {"gate joined with a driven one's", {at(0, k::gates_joined, 0, 1)}},
+        {"gate joined with that of one that is off", {at(0, k::gates_joined, 0, off)}},
+        {"no inductor", {at(0, k::no_inductor)}},
         {"switch leaks 0.08 A, spring off", {at(0, k::leaks, off, 0.08)}},
         {"switch leaks 0.3 A, spring off", {at(0, k::leaks, off, 0.3)}},
         {"on 3 us late", {at(0, k::slow_switch, 0, -0.06)}},
@@ -183,6 +217,12 @@ std::vector<injected> catalogue()
         {"ground lifts 20 mohm", {at(0, k::ground, 0, 0.02)}},
         {"supply 5 V -> 4.2 V", {at(0, k::supply, 0, 4.2)}},
         {"supply 5 V -> 6.5 V", {at(0, k::supply, 0, 6.5)}},
+        {"supply 5 V -> 7.5 V", {at(0, k::supply, 0, 7.5)}},
+        {"supply 5 V -> 1 V, back after 5 s", {at(0, k::supply, 0, 1.0), at(5, k::supply, 0, 5.0)}},
+        {"supply 0.5 V each 0.6 s for 0.3 s", flaps()},
+        {"supply 5 V -> 7.5 V in 20 s", climbs()},
+        {"supply of 2 A", {at(0, k::weak_supply, 0, 2.0)}},
+        {"supply of 0.7 A", {at(0, k::weak_supply, 0, 0.7)}},
         {"supply 5 V -> 8 V", {at(0, k::supply, 0, 8.0)}},
         {"supply +-10 %, 0.2 Hz", {at(0, k::ripple, 0, 0.1)}},
         {"supply +-15 %, 2 Hz", {at(0, k::ripple, 3, 0.15)}},
@@ -247,6 +287,26 @@ std::vector<injected> catalogue()
         {"bus 3 times as slow", {at(0, k::slow_bus, 0, 3)}},
         {"bus 8 times as slow", {at(0, k::slow_bus, 0, 8)}},
         {"bus 15 times as slow", {at(0, k::slow_bus, 0, 15)}},
+        {"both repeated but for a bit", {at(0, k::repeats, 0, 1)}},
+        {"current repeated but for a bit", {at(0, k::repeats, 0, 2)}},
+        {"voltage repeated but for a bit", {at(0, k::repeats, 0, 3)}},
+        {"repeats its last second", {at(0, k::repeats, 0, 4)}},
+        {"repeats its last second, spring off", {at(0, k::repeats, off, 4)}},
+        {"hears 0.1 of its neighbour", {at(0, k::hears, 0, 0.1)}},
+        {"hears 0.3 of its neighbour", {at(0, k::hears, 0, 0.3)}},
+        {"hears -0.3 of its neighbour", {at(0, k::hears, 0, -0.3)}},
+        {"hears 0.3 of its neighbour, spring off", {at(0, k::hears, off, 0.3)}},
+        {"shows its neighbour's voltage", {at(0, k::voltage_of, 0, 2)}},
+        {"shows the voltage of one that is off", {at(0, k::voltage_of, 0, off + 1.0)}},
+        {"lags by 0.3 s", {at(0, k::lags, 0, 0.3)}},
+        {"lags by 2 s", {at(0, k::lags, 0, 2.0)}},
+        {"lags by 10 s", {at(0, k::lags, 0, 10.0)}},
+        {"noise of 0.03 A, V", {at(0, k::noisy, 0, 0.03)}},
+        {"noise of 0.2 A, V", {at(0, k::noisy, 0, 0.2)}},
+        {"noise of 1 A, V", {at(0, k::noisy, 0, 1.0)}},
+        {"shunt the other way round", {at(0, k::scaled, 0, -1.0)}},
+        {"voltage's wire broken", {at(0, k::volt_scaled, 0, 0.0)}},
+        {"voltage's wire at the supply", {at(0, k::lifted, 0, 4.5)}},
         /* board and host */
         {"world 2 % faster", {at(0, k::clock, 0, 1.02)}},
         {"world 2 % slower", {at(0, k::clock, 0, 0.98)}},
@@ -299,10 +359,9 @@ struct result {
 class trial
 {
 public:
-    trial(const injected &one, const std::string &phase, std::uint64_t seed, double freewheel_v,
-          const std::string &elf)
-        : scenario_(life(one, phase, seed, freewheel_v)),
-          board_(scenario_, elf, this, [](void *context, std::uint64_t, std::uint8_t octet) {
+    trial(const injected &one, const std::string &phase, const session &all)
+        : scenario_(life(one, phase, all)), trace_(all.trace),
+          board_(scenario_, all.elf, this, [](void *context, std::uint64_t, std::uint8_t octet) {
               static_cast<trial *>(context)->heard_ += static_cast<char>(octet);
           })
     {
@@ -331,18 +390,22 @@ public:
 private:
     static constexpr double START_S = 1.2;
 
-    scenario life(const injected &one, const std::string &phase, std::uint64_t seed,
-                  double freewheel_v)
+    scenario life(const injected &one, const std::string &phase, const session &all)
     {
+        const std::string pattern = "pattern " + all.pattern;
         scenario s;
-        s.freewheel_v = freewheel_v;
-        s.seed = seed;
+        s.freewheel_v = all.freewheel_v;
+        s.seed = all.seed;
         s.tolerance = 0.05;
-        s.events = {say(0.6, "model cold"), say(0.8, PATTERN)};
+        s.events = {say(0.6, "model cold"), say(0.8, pattern)};
+        for (const std::string &line : all.first) {
+            s.events.push_back(say(0.7, line));
+        }
         from_s_ = phase == "heats" ? START_S + 0.5 : phase == "off" ? 62.0 : 60.0;
+        from_s_ += all.later_s;
         if (phase == "off") {
             s.events.push_back(say(60.0, "off all"));
-            s.events.push_back(say(70.0, PATTERN));
+            s.events.push_back(say(70.0, pattern));
         }
         if (one.name.rfind("thermistor", 0) == 0) {
             s.events.push_back(say(0.5, "$ambient_source=1"));
@@ -369,7 +432,7 @@ private:
             s.events.push_back(say(t, "unlock"));
             s.events.push_back(say(t + 0.1, "clear"));
             s.events.push_back(say(t + 0.2, "supply on"));
-            s.events.push_back(say(t + 0.4, PATTERN));
+            s.events.push_back(say(t + 0.4, pattern));
         }
         s.duration_s = again_s_ + 3 * AGAIN_S;
         std::stable_sort(s.events.begin(), s.events.end(),
@@ -432,6 +495,10 @@ private:
         } else if (!r_.off_s && now_s() < again_s_) {
             r_.off_s = now_s() - from_s_;
         }
+        if (trace_ && now_s() - from_s_ >= traced_s_) {
+            traced_s_++;
+            trace(seen);
+        }
         double &hottest_c = now_s() < again_s_ ? r_.hottest_c : r_.cleared_c;
         for (unsigned k = 0; k < SPRINGS; ++k) {
             const double c = truth_hottest_c(board_.truth(), k);
@@ -452,6 +519,17 @@ private:
         }
     }
 
+    void trace(const board_view_t &seen) const
+    {
+        fmt::print(stderr, "{:5.1f} s:", now_s() - from_s_);
+        for (unsigned k = 0; k < SPRINGS; ++k) {
+            const board_view_spring_t &s = seen.spring[k];
+            fmt::print(stderr, " {:.0f}/{} degC {} mA f{}", truth_hottest_c(board_.truth(), k),
+                       s.temperature_c7 / 128, s.measured_ma, s.fault);
+        }
+        fmt::print(stderr, "\n");
+    }
+
     std::string words() const
     {
         std::string text;
@@ -465,6 +543,8 @@ private:
 
     double from_s_ = 0.0, again_s_ = 0.0;
     scenario scenario_;
+    bool trace_;
+    unsigned traced_s_ = 0;
     std::string heard_;
     faulty_board board_;
     result r_;
@@ -483,28 +563,32 @@ std::string seconds(const std::optional<double> &s)
 int main(int argc, char **argv)
 {
     CLI::App app{"One fault at a time: how hot, how soon safe, how soon said."};
-    std::string elf = ninespring::default_elf("firmware.elf"), json, only;
-    std::uint64_t seed = 7;
-    double freewheel_v = 0.0;
+    session all;
+    std::string json, only;
     std::vector<std::string> phases{"heats", "holds", "off"};
-    app.add_option("--elf", elf)->capture_default_str();
-    app.add_option("--seed", seed, "of the array")->capture_default_str();
-    app.add_option("--freewheel", freewheel_v, "V that the diodes drop, and nobody declares")
+    app.add_option("--elf", all.elf)->capture_default_str();
+    app.add_option("--seed", all.seed, "of the array")->capture_default_str();
+    app.add_option("--freewheel", all.freewheel_v, "V that the diodes drop, and nobody declares")
         ->capture_default_str();
-    app.add_option("--only", only, "faults in whose names this is");
+    app.add_option("--later", all.later_s, "s after the usual moment of a phase")
+        ->capture_default_str();
+    app.add_option("--pattern", all.pattern, "what is driven")->capture_default_str();
+    app.add_option("--first", all.first, "lines that are typed before it");
+    app.add_option("--only", only, "faults in whose names this is (a regular expression)");
     app.add_option("--phase", phases, "heats, holds, off: what the board does as it happens");
+    app.add_flag("--trace", all.trace, "each second of each spring, on stderr: true and believed");
     app.add_option("--json", json, "the figures, for programs");
     CLI11_PARSE(app, argc, argv);
     nlohmann::json figures = nlohmann::json::array();
     fmt::print("phase | fault | hottest | cleared 3 times | hotter unsaid by K | safe s | said s | "
                "said\n");
     for (const std::string &phase : phases) {
-        const result without = trial(catalogue()[0], phase, seed, freewheel_v, elf).run();
+        const result without = trial(catalogue()[0], phase, all).run();
         for (const injected &one : catalogue()) {
-            if (one.name.find(only) == std::string::npos) {
+            if (!std::regex_search(one.name, std::regex(only))) {
                 continue;
             }
-            const result r = trial(one, phase, seed, freewheel_v, elf).run();
+            const result r = trial(one, phase, all).run();
             double unsaid_k = 0.0;
             for (unsigned k = 0; k < SPRINGS; ++k) {
                 unsaid_k = std::fmax(unsaid_k, r.unsaid_c[k] - without.peak_c[k]);
@@ -518,7 +602,7 @@ int main(int argc, char **argv)
                                {"value", std::max(r.hottest_c, r.cleared_c)},
                                {"unit", "degC"},
                                {"target", "<= 120"},
-                               {"command", fmt::format("bench_faults --seed {}", seed)}});
+                               {"command", fmt::format("bench_faults --seed {}", all.seed)}});
         }
     }
     if (!json.empty()) {

@@ -91,6 +91,12 @@ void faulty_board::inflict_on_circuit(const event &e)
         return upset(TRUTH_DIODE_OPEN, e.on ? 1.0 : 0.0);
     case kind::bridged:
         return upset(TRUTH_BRIDGE, e.on ? e.value : -1.0);
+    case kind::gates_joined:
+        return upset(TRUTH_GATES_JOINED, e.on ? e.value : -1.0);
+    case kind::no_inductor:
+        return upset(TRUTH_NO_INDUCTOR, e.on ? 1.0 : 0.0);
+    case kind::weak_supply:
+        return upset(TRUTH_WEAK_A, value);
     case kind::warm_contact:
         return upset(TRUTH_CONTACT_OHM, value);
     case kind::chatters:
@@ -156,6 +162,16 @@ void faulty_board::inflict_on_sensor(const event &e)
         return lies(lie::garbled);
     case kind::answers_too:
         return lies(lie::answers_too);
+    case kind::repeats:
+        return lies(lie::repeats);
+    case kind::hears:
+        return lies(lie::hears);
+    case kind::voltage_of:
+        return lies(lie::voltage_of);
+    case kind::lags:
+        return lies(lie::lags);
+    case kind::noisy:
+        return lies(lie::noisy);
     default:
         return;
     }

@@ -25,7 +25,8 @@ constexpr std::array<const char *, static_cast<std::size_t>(kind::count)> names 
     "diode_open",  "bridged",       "warm_contact", "chatters",    "ground",      "ripple",
     "clock",       "gates_swapped", "thermistor",   "volt_scaled", "stuck_bit",   "drifts",
     "saturates",   "offset",        "lifted",       "bursts",      "nacks",       "garbled",
-    "answers_too", "slow_bus"};
+    "answers_too", "slow_bus",      "repeats",      "hears",       "voltage_of",  "lags",
+    "noisy",       "gates_joined",  "no_inductor",  "weak_supply"};
 
 class dice
 {
@@ -220,7 +221,7 @@ void last(dice &d, scenario &s, const event &one)
 
 void fault(dice &d, scenario &s)
 {
-    const auto what = static_cast<kind>(1 + d.below(static_cast<unsigned>(kind::count) - 1));
+    const auto what = static_cast<kind>(1 + d.below(static_cast<unsigned>(kind::slow_bus)));
     event one{d.uniform(2.0, s.duration_s), what, d.spring(), true, 0.0, ""};
     const double size = amount(d, what, one.channel);
     if (!std::isnan(size)) {
@@ -303,6 +304,46 @@ void fault(dice &d, scenario &s)
     }
 }
 
+/* What came later, of dice of its own: a seed's other events stay what they were. */
+void another(scenario &s)
+{
+    dice d(s.seed, 32);
+    if (d.chance(0.7)) {
+        return;
+    }
+    const auto first = static_cast<unsigned>(kind::slow_bus) + 1u;
+    const auto what =
+        static_cast<kind>(first + d.below(static_cast<unsigned>(kind::count) - first));
+    const unsigned channel = d.spring(), other = (channel + 1 + d.below(8)) % 9;
+    event one{d.uniform(2.0, s.duration_s), what, channel, true, 1.0, ""};
+    switch (what) {
+    case kind::repeats:
+        one.value = 1.0 + d.below(4);
+        break;
+    case kind::hears:
+        one.value = either_way(d, logarithmic(d, 0.01, 0.5));
+        break;
+    case kind::voltage_of:
+        one.value = other + 1.0;
+        break;
+    case kind::lags:
+        one.value = logarithmic(d, 0.02, 10.0);
+        break;
+    case kind::noisy:
+        one.value = logarithmic(d, 0.002, 1.0);
+        break;
+    case kind::gates_joined:
+        one.value = other;
+        break;
+    case kind::weak_supply:
+        one.value = logarithmic(d, 0.3, 3.0);
+        break;
+    default:
+        break;
+    }
+    last(d, s, one);
+}
+
 /* Of half of the boards; of these, half say what it drops, within 0.05 V. */
 void diode(scenario &s)
 {
@@ -347,6 +388,7 @@ scenario draw(std::uint64_t seed)
     for (unsigned n = 1 + d.below(3); n > 0; --n) {
         fault(d, s);
     }
+    another(s);
     diode(s);
     std::stable_sort(s.events.begin(), s.events.end(),
                      [](const event &a, const event &b) { return a.at_s < b.at_s; });

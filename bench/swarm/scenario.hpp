@@ -66,6 +66,15 @@ enum class kind {
     garbled,     /* channel, value: one in so many */
     answers_too, /* channel, value 1..9: whose sensor has its address */
     slow_bus,    /* value: times as slow */
+    repeats,     /* channel, value: what it showed before, but for the last bit (lie::repeats) */
+    hears,       /* channel, value: share of the next one's current that it shows beside its own */
+    voltage_of,  /* channel, value 1..9: whose voltage it shows */
+    lags,        /* channel, value s */
+    noisy,       /* channel, value A and V, at any time */
+    /* the circuit once more */
+    gates_joined, /* channel, value: another one; either is on where one of them would be */
+    no_inductor,  /* channel */
+    weak_supply,  /* value A that it gives at most */
     count
 };
 

@@ -9,8 +9,9 @@
 #define SHORT_OHM 0.005
 /* Without its diode an inductor of 47 uH loses its current at once: 5 V for a share d of 50 us give
  * a mean of 2.66 d^2 A, in triangles. */
-#define PULSES_A 2.66
-#define TURN     6.283185307179586
+#define PULSES_A     2.66
+#define SENSOR_END_A 3.2 /* of what is above, within a pulse, a sensor shows none */
+#define TURN         6.283185307179586
 
 struct truth {
     world_t *world;
@@ -23,6 +24,7 @@ struct truth {
     truth_event_t supply[WORLD_EVENTS_MAX];
     unsigned supplies;
     double supply_v;
+    double sags; /* 1, or less where the supply is too weak */
     bool fed;
     double upset[TRUTH_CLOCK + 1][TRUTH_SPRINGS];
     bool welded[TRUTH_SPRINGS];
@@ -59,8 +61,10 @@ truth_t *truth_create(uint64_t seed, double tolerance, double ambient_c,
     parameters->events = (int)count;
     truth->loop_ohm = parameters->loop_ohm;
     truth->supply_v = parameters->supply_v;
+    truth->sags = 1.0;
     for (unsigned k = 0; k < TRUTH_SPRINGS; k++) {
         truth->upset[TRUTH_BRIDGE][k] = -1.0;
+        truth->upset[TRUTH_GATES_JOINED][k] = -1.0;
     }
     truth->world = world_create(parameters);
     free(parameters);
@@ -92,8 +96,15 @@ static double now_s(const truth_t *truth)
 static double supply_v(const truth_t *truth)
 {
     const double share = of(truth, TRUTH_RIPPLE_SHARE, 0);
-    return truth->supply_v *
+    return truth->supply_v * truth->sags *
            (1.0 + share * sin(TURN * of(truth, TRUTH_RIPPLE_HZ, 0) * now_s(truth)));
+}
+
+/* Pulses of one timer begin together: joined gates are on as long as the longer one. */
+static double duty_of(const truth_t *truth, unsigned k)
+{
+    const double other = of(truth, TRUTH_GATES_JOINED, k);
+    return other >= 0.0 ? fmax(truth->duty[k], truth->duty[(unsigned)other]) : truth->duty[k];
 }
 
 static double spring_ohm(const truth_t *truth, unsigned k)
@@ -114,7 +125,7 @@ static bool is_open(const truth_t *truth, unsigned k)
 /* Mean voltage behind the switch; where current flows, its diode drops its part of that. */
 static double driven_v(const truth_t *truth, unsigned k, bool flows)
 {
-    double duty = truth->duty[k];
+    double duty = duty_of(truth, k);
     if (duty > 0.0 && duty < 1.0) {
         duty = fmin(fmax(duty + of(truth, TRUTH_SLOW_SHARE, k), 0.0), 1.0);
     }
@@ -159,6 +170,12 @@ static flow_t flow_of(const truth_t *truth, unsigned k)
         current_a = fmin(current_a, PULSES_A * duty * duty);
         heating_a = current_a * sqrt(4.0 / (3.0 * fmax(duty, 0.01)));
     }
+    if (of(truth, TRUTH_NO_INDUCTOR, k) > 0.0 && duty > 0.0) {
+        const double pulse_a = current_a / duty;
+        current_a *= fmin(SENSOR_END_A / pulse_a, 1.0);
+        heating_a = pulse_a * sqrt(duty);
+        return (flow_t){current_a, duty * pulse_a * ohm, heating_a};
+    }
     return (flow_t){current_a, current_a * ohm,
                     truth->fault[k] == PLANT_FAULT_SHORT ? 0.0 : heating_a};
 }
@@ -179,9 +196,21 @@ static void look_at_welds(truth_t *truth)
     }
 }
 
+/* What it gives to all stages, each by its duty; the voltage follows within some ticks. */
+static void look_at_supply(truth_t *truth)
+{
+    const double most_a = of(truth, TRUTH_WEAK_A, 0);
+    double sum_a = 0.0;
+    for (unsigned k = 0; k < TRUTH_SPRINGS; k++) {
+        sum_a += flow_of(truth, k).sensed_a * duty_of(truth, k);
+    }
+    const double fits = most_a > 0.0 ? truth->sags * sqrt(most_a / fmax(sum_a, 0.01)) : 1.0;
+    truth->sags = fmin(fits, 1.0);
+}
+
 void truth_upset(truth_t *truth, truth_upset_t what, unsigned spring, double value)
 {
-    if (what == TRUTH_BRIDGE) { /* of both */
+    if (what == TRUTH_BRIDGE || what == TRUTH_GATES_JOINED) { /* of both */
         const int other = (int)(value >= 0.0 ? value : of(truth, what, spring));
         if (other >= 0) {
             truth->upset[what][other] = value >= 0.0 ? (double)spring : -1.0;
@@ -200,6 +229,7 @@ static void end_tick(truth_t *truth)
     }
     world_tick(truth->world, &outputs, &inputs);
     look_at_welds(truth);
+    look_at_supply(truth);
     for (unsigned n = 0; n < truth->supplies; n++) {
         if (truth->supply[n].time_s <= world_time_s(truth->world)) {
             truth->supply_v = truth->supply[n].value;

@@ -24,19 +24,22 @@ typedef struct {
     double value;
 } truth_event_t;
 
-/* What else a circuit may have; value 0 (TRUTH_BRIDGE: below 0) ends it. */
+/* What else a circuit may have; value 0 (TRUTH_BRIDGE, TRUTH_GATES_JOINED: below 0) ends it. */
 typedef enum {
     TRUTH_LEAK_A,       /* of a switch that is off */
     TRUTH_SLOW_SHARE,   /* of the period: it goes on later (below 0) or off later */
     TRUTH_WELDS_AT_C,   /* of its spring: then it stays closed */
     TRUTH_DIODE_OPEN,   /* its current ends with each pulse */
     TRUTH_BRIDGE,       /* value: the spring whose hot end touches this one's */
+    TRUTH_GATES_JOINED, /* value: the spring whose switch's gate this one's touches */
+    TRUTH_NO_INDUCTOR,  /* its turns touch: current flows in the pulses alone */
     TRUTH_CONTACT_OHM,  /* more for each 100 K of its spring */
     TRUTH_CHATTER_HZ,   /* its crimp opens and closes */
     TRUTH_GROUND_OHM,   /* of all: what their currents lift is read beside each voltage */
     TRUTH_FREEWHEEL_V,  /* of all: what their diodes drop */
     TRUTH_RIPPLE_SHARE, /* of all: of the supply, up and down */
     TRUTH_RIPPLE_HZ,    /* of all */
+    TRUTH_WEAK_A,       /* of all: the supply gives no more, its voltage falls */
     TRUTH_CLOCK         /* of all: the world's seconds in one of the board's; 0: 1 */
 } truth_upset_t;
 

@@ -69,19 +69,65 @@ double upset_bus::lied_a(unsigned k, double current_a) const
     return end_a > 0.0 ? std::clamp(lied_a, -end_a, end_a) : lied_a;
 }
 
+/* Of a current the last bit that the program keeps: 1 mA. */
+std::uint16_t upset_bus::repeated(unsigned k, unsigned number, std::uint16_t value)
+{
+    past &was = past_[k][number - 1u];
+    const double how = of(lie::repeats, k);
+    if (how == 4.0) {
+        was.at = (was.at + 1) % SECOND;
+        return was.values[was.at];
+    }
+    if (how == 0.0 || how == (number == CURRENT ? 3.0 : 2.0)) {
+        was.at = (was.at + 1) % SECOND;
+        was.values[was.at] = value;
+        return value;
+    }
+    const int bit = static_cast<int>(random_bits(&dice_) % 3u) - 1;
+    return static_cast<std::uint16_t>(was.values[was.at] + bit * (number == CURRENT ? 10 : 8));
+}
+
+double upset_bus::lagging(unsigned k, unsigned number, double value)
+{
+    past &was = past_[k][number - 1u];
+    const double now_s = board_time_s(board_), tau_s = of(lie::lags, k);
+    const double kept = tau_s > 0.0 ? std::exp((was.then_s - now_s) / tau_s) : 0.0;
+    was.lagging = kept > 0.0 ? value + kept * (was.lagging - value) : value;
+    was.then_s = now_s;
+    return was.lagging;
+}
+
 std::uint16_t upset_bus::reads(unsigned k, unsigned number, std::uint16_t value)
 {
-    double noise = 0.0;
+    double noise = of(lie::noisy, k);
     if (of(lie::bursts, k) > 0.0 && std::fmod(board_time_s(board_), BURST_EVERY_S) < BURST_S) {
         noise = of(lie::bursts, k);
     }
+    const auto shows = [&](unsigned other, unsigned what) {
+        return board_sensor_register(board_, other, what);
+    };
     if (number == CURRENT) {
         const double read_a = A_OF_BIT * static_cast<std::int16_t>(value);
-        const double lied = lied_a(k, read_a) + noise * random_noise(&dice_);
+        double heard_a = read_a;
+        if (of(lie::hears, k) != 0.0) {
+            heard_a += of(lie::hears, k) * A_OF_BIT *
+                       static_cast<std::int16_t>(shows((k + 1u) % BOARD_CHANNELS, CURRENT));
+        }
+        const double lied = lied_a(k, lagging(k, CURRENT, heard_a)) + noise * random_noise(&dice_);
         value = lied == read_a ? value : current_register(lied);
     } else if (number == VOLTAGE) {
+        if (of(lie::voltage_of, k) > 0.0) {
+            value = static_cast<std::uint16_t>(
+                (shows(static_cast<unsigned>(of(lie::voltage_of, k)) - 1u, VOLTAGE) & ~7u) |
+                (value & 7u));
+        }
+        const double late_v = lagging(k, VOLTAGE, V_OF_BIT * (value >> 3));
+        value = of(lie::lags, k) > 0.0 ? voltage_register(late_v, value) : value;
         const double lift_v = of(lie::lifted, k) + noise * random_noise(&dice_);
         value = lift_v == 0.0 ? value : voltage_register(V_OF_BIT * (value >> 3) + lift_v, value);
+    }
+    if (number == CURRENT || number == VOLTAGE) {
+        value = repeated(k, number, value);
     }
     const double bit = std::fabs(of(lie::stuck_bit, k));
     if (bit > 0.0 && number == (bit <= 16.0 ? CURRENT : VOLTAGE)) {

@@ -24,6 +24,12 @@ enum class lie {
     nacks,       /* one in so many addresses */
     garbled,     /* one in so many registers: a bit of it is another one */
     answers_too, /* 1..9: the sensor of that number answers at this one's address, not at its own */
+    repeats,     /* 1: both as they were when it began, 2: its current, 3: its voltage, each but for
+                    its last bit; 4: the second before, again and again */
+    hears,       /* its current and this share of the next one's */
+    voltage_of,  /* 1..9: shows the voltage of that number */
+    lags,        /* s: behind what it measures */
+    noisy,       /* A, and V */
     count
 };
 
@@ -42,11 +48,20 @@ private:
     bool acknowledges(unsigned k);
     std::uint16_t reads(unsigned k, unsigned number, std::uint16_t value);
     double lied_a(unsigned k, double current_a) const;
+    std::uint16_t repeated(unsigned k, unsigned number, std::uint16_t value);
+    double lagging(unsigned k, unsigned number, double value);
 
     const board_t *board_ = nullptr;
     random_t dice_;
     std::array<std::array<double, BOARD_CHANNELS>, static_cast<std::size_t>(lie::count)> value_{};
     std::array<double, BOARD_CHANNELS> since_s_{};
+    static constexpr std::size_t SECOND = 50; /* readings */
+    struct past {
+        std::array<std::uint16_t, SECOND> values{};
+        std::size_t at = 0;
+        double lagging = 0.0, then_s = 0.0;
+    };
+    std::array<std::array<past, 2>, BOARD_CHANNELS> past_{}; /* of current and voltage */
 };
 
 } // namespace swarm
