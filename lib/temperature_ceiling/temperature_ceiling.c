@@ -261,7 +261,9 @@ static void add_heat(temperature_ceiling_t *ceiling, const thermal_model_t *mode
 {
     const uint16_t share = ceiling->capacity_share[k];
     float whole_k = (float)model->latent_full_c8 * (1.0f / 256.0f);
-    if (share != WHOLE_SHARE) { /* the same heat */
+    /* Where less heat capacity counts than is declared, it takes up as much less latent heat, for a
+     * scale is of both; and gives back the same heat, for the other number is not. */
+    if (share != WHOLE_SHARE && gain_k < 0.0f) {
         whole_k = whole_k * (float)WHOLE_SHARE / (float)share;
     }
     const float per_q15 = whole_k * (1.0f / (float)THERMAL_MODEL_AUSTENITE_FULL);

@@ -79,7 +79,7 @@ TEST(it_follows_the_declared_network)
 }
 
 /* Other numbers are declared, by settings that arrive now. */
-static void declare(float loss, float capacity)
+static void declare_scaled(float loss, float capacity, float scale)
 {
     temperature_ceiling_declared_t before[THERMAL_MODEL_MAX_SPRINGS];
     thermal_model_state_t state;
@@ -90,6 +90,9 @@ static void declare(float loss, float capacity)
     thermal_model_parameters_t now = parameters;
     now.loss_uw_per_k = (uint16_t)(loss * (float)parameters.loss_uw_per_k);
     now.heat_capacity_mj_per_k = (uint16_t)(capacity * (float)parameters.heat_capacity_mj_per_k);
+    for (uint8_t k = 0; k < model.springs; k++) {
+        now.heat_capacity_scale_permille[k] = (uint16_t)(1000.0f * scale);
+    }
     TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &now, NULL));
     (void)thermal_model_set_state(&model, &state);
     for (uint8_t k = 0; k < model.springs; k++) {
@@ -97,8 +100,33 @@ static void declare(float loss, float capacity)
     }
 }
 
+static void declare(float loss, float capacity)
+{
+    declare_scaled(loss, capacity, 1.0f);
+}
+
+/* A scale is of the latent heat, too: beside a twin to which none was declared, no spring that
+ * transforms is colder. */
+TEST(a_scale_that_is_declared_to_a_warm_spring_takes_no_more_latent_heat)
+{
+    float twin_c[30];
+    for (int twin = 1; twin >= 0; twin--) {
+        setUp();
+        run(0.6f, 600000u, 12.0f);
+        declare_scaled(1.0f, 1.0f, twin ? 1.0f : 3.0f);
+        for (int m = 0; m < 30; m++) {
+            run(0.6f, 600000u, 6.0f);
+            if (twin) {
+                twin_c[m] = temperature_ceiling_c(&ceiling, 4);
+            }
+            TEST_ASSERT_FLOAT_WITHIN(3.0f, twin_c[m], temperature_ceiling_c(&ceiling, 4));
+        }
+    }
+}
+
 /* Heated, then driven on for as long, beside a twin to which nothing was declared: what is declared
- * makes no warm spring colder, however often it arrives; but hotter, if it is. */
+ * makes no warm spring colder, however often it arrives; but hotter, if it is. Of a larger heat
+ * capacity it is hotter by as much as it then counts less latent heat, all of which is 29 K. */
 TEST(of_warm_springs_the_more_careful_numbers_count)
 {
     static const struct {
@@ -119,7 +147,10 @@ TEST(of_warm_springs_the_more_careful_numbers_count)
                 if (twin) {
                     twin_c[m] = temperature_ceiling_c(&ceiling, 4);
                 }
-                TEST_ASSERT_FLOAT_WITHIN(3.0f, twin_c[m], temperature_ceiling_c(&ceiling, 4));
+                const float c = temperature_ceiling_c(&ceiling, 4);
+                TEST_ASSERT_TRUE(c > twin_c[m] - 3.0f);
+                TEST_ASSERT_TRUE(c < twin_c[m] +
+                                         (row[n].capacity > row[n].twin_capacity ? 29.0f : 3.0f));
             }
         }
     }
