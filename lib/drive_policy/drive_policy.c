@@ -116,6 +116,15 @@ static float phase_of(const drive_policy_input_t *in, uint8_t k)
     return spring_estimator_phase(in->belief, in->model, k);
 }
 
+/* What nobody knows anything of is looked at, or waits until it is cold. */
+static uint16_t boost_of(const drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k)
+{
+    if (spring_estimator_possible(belief_of(in, k)) != SPRING_PHASE_ANY) {
+        return policy->parameters.boost_current_ma;
+    }
+    return spring_estimator_may_look(in->belief, k) ? LOOK_MA : 0;
+}
+
 static void enter(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k,
                   drive_policy_stage_t stage, uint16_t level_permille)
 {
@@ -133,7 +142,7 @@ static void enter(drive_policy_t *policy, const drive_policy_input_t *in, uint8_
         supply_queue_add(&policy->queue, k);
         spring_estimator_begin_heating(in->belief, in->model, k);
         s->rise_k_per_s = RISE_BEGINS_K_PER_S;
-        s->wanted_ma = policy->parameters.boost_current_ma;
+        s->wanted_ma = boost_of(policy, in, k);
         break;
     case DRIVE_POLICY_STAGE_HOLD:
         spring_estimator_begin_hold(in->belief, in->model, k, is_full(level_permille));
@@ -194,13 +203,11 @@ static void heat(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
     drive_policy_spring_t *s = &policy->spring[k];
     const spring_belief_t *b = belief_of(in, k);
     const thermal_model_transformation_t points = thermal_model_transformation(in->model, k);
-    const uint16_t boost_ma = policy->parameters.boost_current_ma;
     const int16_t c7 = thermal_model_temperature_c7(in->model, k);
-    if (spring_estimator_possible(b) == SPRING_PHASE_ANY) { /* a look, or until it is cold */
-        s->wanted_ma = spring_estimator_may_look(in->belief, k) ? LOOK_MA : 0;
+    s->wanted_ma = boost_of(policy, in, k);
+    if (spring_estimator_possible(b) == SPRING_PHASE_ANY) {
         return;
     }
-    s->wanted_ma = boost_ma;
     const bool full = is_full(level_permille);
     const float level = 0.001f * (float)level_permille;
     if (is_limited(policy, in, k) || is_stalled(s) ||
