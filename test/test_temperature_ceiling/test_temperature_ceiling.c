@@ -124,6 +124,26 @@ TEST(a_scale_that_is_declared_to_a_warm_spring_takes_no_more_latent_heat)
     }
 }
 
+/* What it took up it gives back, whatever is declared then: beside a twin to which nothing was, no
+ * spring that cools is colder. */
+TEST(a_warm_spring_gives_back_the_latent_heat_that_it_took_up)
+{
+    float twin_c[20];
+    for (int twin = 1; twin >= 0; twin--) {
+        setUp();
+        run(0.6f, 600000u, 180.0f);
+        TEST_ASSERT_TRUE(temperature_ceiling_c(&ceiling, 4) > 100.0f);
+        declare(1.0f, twin ? 1.0f : 1.5f);
+        for (int m = 0; m < 20; m++) {
+            run(0.0f, 0u, 6.0f);
+            if (twin) {
+                twin_c[m] = temperature_ceiling_c(&ceiling, 4);
+            }
+            TEST_ASSERT_TRUE(temperature_ceiling_c(&ceiling, 4) > twin_c[m] - 1.0f);
+        }
+    }
+}
+
 /* Heated, then driven on for as long, beside a twin to which nothing was declared: what is declared
  * makes no warm spring colder, however often it arrives; but hotter, if it is. Of a larger heat
  * capacity it is hotter by as much as it then counts less latent heat, all of which is 29 K. */
