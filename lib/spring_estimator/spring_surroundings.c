@@ -41,13 +41,17 @@ __attribute__((noinline)) bool spring_open_to_step(spring_estimator_t *e, spring
     return opens;
 }
 
+static bool is_held_and_read(const spring_belief_t *b)
+{
+    return !b->heating && b->possible == SPRING_PHASE_AUSTENITE && spring_estimator_sees(b);
+}
+
 bool spring_all_read_hot(const spring_estimator_t *e)
 {
     uint8_t hot = 0;
     for (uint8_t i = 0; i < e->springs; i++) {
         const spring_belief_t *b = &e->spring[i];
-        if (b->fresh != 0 && !b->heating && b->possible == SPRING_PHASE_AUSTENITE &&
-            spring_estimator_sees(b)) {
+        if (is_held_and_read(b)) {
             if (!b->hot) {
                 return false;
             }
@@ -67,8 +71,7 @@ bool spring_keeps_alone(const spring_estimator_t *e, const spring_belief_t *b, u
     uint8_t others = 0;
     for (uint8_t i = 0; i < e->springs; i++) {
         const spring_belief_t *other = &e->spring[i];
-        if (i != k && !other->heating && other->possible == SPRING_PHASE_AUSTENITE &&
-            spring_estimator_sees(other)) {
+        if (i != k && is_held_and_read(other)) {
             sum_w_per_k += other->kept_w_per_k;
             others++;
         }

@@ -453,7 +453,6 @@ TEST(who_is_suspected_is_found_in_one_window_after_a_clear)
     }
 }
 
-/* 0 is for who says nothing; more than 255 / 128 is as much. */
 /* 5 % beyond what a cable makes is 30 mV of 600, and 20 of 400, which offsets may make. */
 TEST(a_window_that_would_not_tell_a_lie_acquits_nobody_who_was_found)
 {
@@ -485,6 +484,7 @@ TEST(who_shows_its_own_share_again_is_acquitted)
     TEST_ASSERT_EQUAL_HEX(1, rounds(1, SPRINGS, 600.0f, 0.8f, 1.0f));
 }
 
+/* 0 is for who says nothing; more than 255 / 128 is as much. */
 TEST(a_share_is_kept_to_the_nearest_128th)
 {
     static const float shares[][2] = {{0.0f, 1},     {0.4f, 1},     {1.4f, 1},
