@@ -108,7 +108,11 @@ def test_the_rest_of_a_run_alone_is_in_the_room_that_it_began_in() -> None:
     assert kept is not None and kept.spec.effects == (), "judged like any other"
     assert said[0].startswith("run_ambient_offset is not named")
     both = model(RUN_AMBIENT, "ambient_drift")
-    assert told.carried(both, without).spec.effects == (RUN_AMBIENT,), "a drift goes its own way"
+    for off, stays in ((2.0, False), (0.5, True)):
+        told = Told({"": 0.5, "lag": 0.5, RUN_AMBIENT: 1.0, f"{RUN_AMBIENT} ambient_drift": off})
+        carried = told.carried(both, without)
+        assert (carried is both) == stays, "a drift goes its own way where it does not foretell the rest"
+        assert stays or carried.spec.effects == (RUN_AMBIENT,)
 
 
 def test_what_is_of_the_array_is_judged_without_what_is_of_that_day() -> None:

@@ -252,8 +252,10 @@ class Unseen:
 
     def carried(self, fit: Fit, reduced: Callable[[Fit, str], Fit]) -> Fit:
         """Return a fit without what is of that day: no other run tells that, and beside it a part of the runs tells little of
-        the rest. What a run alone began with is the rest's, too: only what drifts is not."""
+        the rest. What a run alone began with is the rest's, too: only what drifts is not, where it does not foretell the rest."""
         alone = bool(self.splits) and self.splits[0].alone
+        if alone and not self.worse(fit):
+            return fit
         of_that_day = set(OF_THAT_DAY) - set(RUNS_OWN if alone else ())
         for effect in fit.spec.effects:
             if effect in of_that_day and effect not in self.base.spec.effects:
