@@ -444,15 +444,30 @@ class Search:
         order = sorted((chosen for chosen in best if len(chosen) > 1), key=lambda one: -best[one])
         return [sorted(one) for one in order[:REFITTED] if best[one] > 0]
 
+    @staticmethod
+    def _anywhere(candidates: Sequence[Candidate], sets: Sequence[Sequence[int]]) -> list[list[int]]:
+        """Return sets with what may be in any of several places among them, not only where it is declared: of that a linear forecast
+        without its company says too little."""
+        out: list[list[int]] = []
+        for k, one in enumerate(candidates):
+            for chosen in sets if one.alternatives else ():
+                rest = [j for j in chosen if candidates[j].effect != one.effect]
+                if (more := sorted([*rest, k])) not in [*sets, *out] and len(more) <= MAX_EFFECTS:
+                    out.append(more)
+        return out
+
     def downward(self, current: Fit) -> Fit:
         """Return the best fit of causes that only help together, pruned; `current` where none is better."""
         screen = self.screen(self.base)
-        for chosen in self.together(self.base):
-            sizes = screen.forecast(chosen)[1]
-            if len(sizes) < len(chosen) or not self.goes_on():
-                continue
+        sets = self.together(self.base)
+        sets = [one for one in sets if len(screen.forecast(one)[1]) == len(one)]
+        for chosen in [*sets, *self._anywhere(screen.candidates, sets)]:
+            if not self.goes_on() or excess(self.problem, current) < MIN_GAIN**2:
+                break
+            sizes = dict.fromkeys(chosen, 1.0) | screen.forecast(chosen)[1]
             self.progress(f"fitting {' + '.join(screen.candidates[k].effect for k in chosen)}")
             fit = self.refit(self.base, [screen.candidates[k] for k in chosen], [sizes[k] for k in chosen])
+            fit = self.begun_again(fit, self.base)
             if fit.chi2 >= current.chi2:
                 continue  # and so is every part of it
             fit = self.begun_again(self.backward(fit)[0], self.base)

@@ -16,7 +16,7 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         yield Candidate(
             alloy.VARIANT,
             (linear(NAME, 0.0, 200.0, size, size), *alloy.numbers(scene)),
-            tuple({NAME: size, alloy.SHIFT: shift} | alloy.STILL for shift in places),
+            tuple({NAME: size} | place for place in places),
             most=6.0,
             alternatives=True,
         )

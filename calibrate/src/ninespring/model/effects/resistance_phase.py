@@ -18,7 +18,7 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         yield Candidate(
             alloy.VARIANT,
             (number, *alloy.numbers(scene)),
-            tuple({name: 1.15 * martensite, alloy.SHIFT: shift} | alloy.STILL for shift in places),
+            tuple({name: 1.15 * martensite} | place for place in places),
             signed=True,
             neutral=martensite,
             alternatives=True,
