@@ -92,11 +92,25 @@ def with_one_after_the_other(found: search.Search, *names: str) -> Fit:
 
 def test_an_alloy_that_went_astray_before_its_company_came_begins_again_beside_it(tmp_path: Path) -> None:
     found = searched_pulse(tmp_path / "pulse.csv")
-    astray = with_one_after_the_other(found, "latent_heat", "sensor_lag")
+    astray = with_one_after_the_other(found, "latent_heat", "ambient_drift")
     again = found.begun_again(astray, found.base)
     assert again.spec.effects != () and set(again.spec.effects) == set(astray.spec.effects)
     assert again.chi2 < 0.7 * astray.chi2
     assert found.fits[found.key(again.spec)] is again
+
+
+def test_an_alloy_is_found_from_far_off_though_what_comes_later_is_still_missing(tmp_path: Path) -> None:
+    """What is believed of it stands against readings that are off by kelvins for minutes: it does not bend to what its company explains."""
+    found = searched_pulse(tmp_path / "pulse.csv")
+    astray = with_one_after_the_other(found, "sensor_lag", "latent_heat")
+    far = astray.as_dict() | {"latent_heat_j": 10.8, "alloy_shift_k": -31.0, "heating_width_change_k": 28.0}
+    assert found.problem.fit(astray.spec, far).chi2 == pytest.approx(astray.chi2, rel=0.05)
+    assert astray.chi2 > 50.0 * astray.count and astray.at_bounds() == []
+    true = with_one_after_the_other(found, "sensor_lag", "latent_heat", "run_ambient_offset")
+    assert true.chi2 < 1.2 * true.count, "what it did not bend to, it explains"
+    assert true.value("latent_heat_j") == pytest.approx(7.0, rel=0.05)
+    assert true.value("sensor_lag_s") == pytest.approx(4.0, rel=0.05)
+    assert true.firm < 2.0 < 50.0 < astray.firm
 
 
 def test_blocks_in_which_a_drive_is_whole_do_not_speak_against_what_only_they_tell(tmp_path: Path) -> None:

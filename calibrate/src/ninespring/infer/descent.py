@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -15,6 +16,10 @@ REUSED = 0.1
 FORETOLD = 0.5
 """Part of what a step changed that slopes may have foretold wrongly and still be mended, not simulated again: they are right
 for the greater part."""
+FIRMER = 0.8
+"""Of how firmly what is believed stood when a descent began, the part at its end from which that made no difference."""
+AGAIN = 4
+"""Times that a fit goes on from where it was, at most, what is believed less firm there."""
 KEPT = 4
 """Points whose simulations are kept."""
 
@@ -26,7 +31,8 @@ class Descent:
     """Free numbers on their way: z are their inner coordinates.
 
     `show` simulates all runs at numbers in their own units, `slopes` returns d(vector) / d(inner coordinate) of the
-    numbers named by their places, (count, places), given what is shown there.
+    numbers named by their places, (count, places), given what is shown there, and `alike` how many readings of a vector
+    carry what one of its own would.
     """
 
     def __init__(
@@ -34,13 +40,16 @@ class Descent:
         free: Sequence[Free],
         show: Callable[[np.ndarray], Shown],
         slopes: Callable[[np.ndarray, list[np.ndarray], list[int]], np.ndarray],
+        alike: Callable[[np.ndarray], float],
     ) -> None:
-        self.free, self._show, self._slopes = list(free), show, slopes
+        self.free, self._show, self._slopes, self._alike = list(free), show, slopes, alike
         self.low = np.array([f.inner(f.low) for f in free])
         self.high = np.array([f.inner(f.high) for f in free])
         # what is believed before, as further residuals: (z - believed) / its standard deviation
         self.believed = np.array([f.inner(f.start) for f in free])
         self.trust = np.array([f.trust for f in free])
+        self.firm = 1.0
+        """How many times as firmly it stands against the readings, by what they left where the last descent began."""
         self.mended = False
         """Slopes were mended, not simulated: the end may lie before the minimum."""
         self._cache: dict[bytes, Shown] = {}
@@ -111,10 +120,23 @@ class Descent:
             # slopes that were mended may end before the minimum: fresh ones say whether they did
             self.forget()
             found = self._descend(found.x, tolerance, max_steps)
+        for _ in range(AGAIN if settle else 0):
+            if self._firm(found.x) > FIRMER * self.firm:
+                break
+            found = self._descend(found.x, tolerance, max_steps)
         return found
 
+    def _firm(self, z: np.ndarray) -> float:
+        """Return how firmly what is believed stands against the readings at z: as if their noise were as large as what is off there,
+        and as lasting. Readings that a model misses by ten times their noise, for minutes, say little of its numbers."""
+        if not self.trust.any():
+            return 1.0
+        vector = self.shown(z)[1]
+        return math.sqrt(max(1.0, float(vector @ vector) / max(1, vector.size)) * self._alike(vector))
+
     def _descend(self, begin: np.ndarray, tolerance: float, max_steps: int) -> OptimizeResult:
-        some, trust = self.trust > 0, self.trust
+        self.firm = self._firm(begin)
+        some, trust = self.trust > 0, self.firm * self.trust
         return least_squares(
             lambda z: np.concatenate([self.shown(z)[1], (trust * (z - self.believed))[some]]),
             begin,

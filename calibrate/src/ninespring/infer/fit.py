@@ -25,6 +25,8 @@ class Fit:
     jacobian: np.ndarray | None = None
     """d(residual / noise) / d(inner coordinate), (count, free)."""
     vector: np.ndarray | None = None
+    firm: float = 1.0
+    """How many times as firmly what is believed of its numbers stood against the readings."""
     covariance: np.ndarray | None = None
     """Of the inner coordinates, autocorrelation taken into account."""
     stuck: list[str] = field(default_factory=list)

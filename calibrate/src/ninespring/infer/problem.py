@@ -413,6 +413,15 @@ class Problem:
             out.append(left)
         return out
 
+    def alike(self, vector: np.ndarray) -> float:
+        """Return how many readings of what a model leaves, (count,) in units of the noise, carry what one of its own would."""
+        if self.colour is not None:
+            return 1.0  # innovations are white
+        fields = [np.full(mask.shape, np.nan) for mask in self.mask]
+        for field, mask, part in zip(fields, self.mask, self.by_run(vector), strict=True):
+            field[mask] = part
+        return statistics.correlation_factor(fields, self.longest_lag())
+
     # ---- fitting ----------------------------------------------------------------------------------------
 
     def jacobian(
@@ -474,7 +483,9 @@ class Problem:
             shown = self.predictions(spec, numbers)
             return shown, self.vector(self.residuals(shown))
 
-        way = Descent(free, show, lambda numbers, shown, columns: self.jacobian(spec, numbers, shown, columns))
+        way = Descent(
+            free, show, lambda numbers, shown, columns: self.jacobian(spec, numbers, shown, columns), self.alike
+        )
         if near is not None and near.jacobian is not None and len(near.jacobian) == self.count:
             way.begin_near(near)
         found = way.to_minimum(values, tolerance, max_steps, settle)
@@ -488,6 +499,7 @@ class Problem:
             self.residuals(shown),
             jac if settle or not way.mended else None,
             vector,
+            firm=way.firm,
         )
         fit.sse = self.plain(fit.residual)
         norms = np.linalg.norm(jac, axis=0)
@@ -511,7 +523,7 @@ class Problem:
         free = fit.spec.free
         z = np.array([f.inner(v) for f, v in zip(free, fit.values, strict=True)])
         low, high = np.array([f.inner(f.low) for f in free]), np.array([f.inner(f.high) for f in free])
-        trust = np.array([f.trust for f in free])
+        trust = fit.firm * np.array([f.trust for f in free])
         believed = trust * (z - np.array([f.inner(f.start) for f in free]))
         slopes = self.plain_slopes(fit)
         left = np.concatenate(self.scaled(fit.residual))
