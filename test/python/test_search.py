@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,7 +12,7 @@ import pytest
 from made import searched
 from ninespring.find import diagnosis, evidence, experiments, search
 from ninespring.find.plan import plan_experiment
-from ninespring.infer import budget
+from ninespring.infer import budget, room
 from ninespring.infer.declared import base_spec
 from ninespring.infer.fit import Fit
 from ninespring.infer.predict import predict
@@ -119,6 +120,29 @@ def test_blocks_in_which_a_drive_is_whole_do_not_speak_against_what_only_they_te
     assert true.value("ambient_offset_k@1") == pytest.approx(-3.9, abs=0.5)
     assert found.problem.holdout_rmse(true) < 0.2 < 1.0 < found.problem.holdout_rmse(found.base)
     assert found.holds_out(true, found.base)
+
+
+def test_the_room_of_the_only_run_is_believed_where_its_spring_rests(tmp_path: Path) -> None:
+    found = searched_pulse(tmp_path / "pulse.csv")
+    run = found.problem.runs[0]
+    (one,) = [free for c in found.candidates if c.effect == "run_ambient_offset" for free in c.free]
+    assert one.start == pytest.approx(-3.9, abs=0.1) and one.trust == 1.0
+    there = with_one_after_the_other(found, "sensor_lag", "latent_heat", "run_ambient_offset")
+    without = found.reduced(there, "run_ambient_offset")
+    price = 0.5 * np.log(there.count)
+    said = evidence.relief(there, without) + price
+    assert said == pytest.approx(evidence.strain(without, there) - evidence.strain(there, without))
+    assert said == pytest.approx(0.5 * 3.9**2, abs=1.5), "that it rests beside the logged room speaks against that"
+    # nothing is said where it began warm, was nowhere near, or where there is nothing to be beside
+    for other in (
+        replace(run, warm=True),
+        replace(run, ambient_c=None),
+        replace(run, ambient_c=run.ambient_c - 20.0),
+        replace(run, temperature_c=run.temperature_c + 15.0, ambient_c=run.ambient_c + 15.0),
+    ):
+        assert room.above_logged(other) is None
+    several = replace(scene_of(found.problem), runs=2)
+    assert all(free.start == 0.0 for c in effects.of_runs(several) for free in c.free if "ambient" in free.key)
 
 
 def test_where_the_room_of_the_only_run_is_bends_nothing(tmp_path: Path) -> None:

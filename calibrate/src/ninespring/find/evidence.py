@@ -34,13 +34,16 @@ def log_evidence(problem: Problem, better: Fit, other: Fit) -> float:
 def relief(better: Fit, other: Fit) -> float:
     """Return the nats for `better` that no reading tells: random effects that need not lie so far apart, less the price of its numbers."""
     k = len(better.spec.free) - len(better.stuck) - (len(other.spec.free) - len(other.stuck))
-    return strain(other) - strain(better) - 0.5 * k * math.log(max(2, better.count))
+    return strain(other, better) - strain(better, other) - 0.5 * k * math.log(max(2, better.count))
 
 
-def strain(fit: Fit) -> float:
-    """Return the nats by which an effect's numbers are less likely than those in the middle of what is believed of them."""
-    pairs = zip(fit.spec.free, fit.values, strict=True)
-    return sum(0.5 * (f.trust * (f.inner(v) - f.inner(f.start))) ** 2 for f, v in pairs if f.effect is not None)
+def strain(fit: Fit, beside: Fit) -> float:
+    """Return the nats by which an effect's numbers are less likely than those in the middle of what is believed of them; of an
+    effect that only the fit beside it has, the value that the numbers have without."""
+    pairs = [(f, float(v)) for f, v in zip(fit.spec.free, fit.values, strict=True) if f.effect is not None]
+    own = {f.key for f, _ in pairs}
+    pairs += [(f, f.absent) for f in beside.spec.free if f.absent is not None and f.key not in own]
+    return sum(0.5 * (f.trust * (f.inner(v) - f.inner(f.start))) ** 2 for f, v in pairs)
 
 
 def likelihood(problem: Problem, fit: Fit) -> float:

@@ -39,7 +39,8 @@ def _own(fit: Fit, effect: str) -> tuple[list[int], np.ndarray]:
 def spread_of(fit: Fit, effect: str) -> float:
     """Return how far runs lie apart about the array's own number, rms, in the inner coordinate: sizes and errors both count."""
     at, covariance = _own(fit, effect)
-    z = np.array([fit.spec.free[k].inner(fit.values[k]) - fit.spec.free[k].inner(fit.spec.free[k].start) for k in at])
+    mine = [(fit.spec.free[k], float(fit.values[k])) for k in at]
+    z = np.array([f.inner(v) - f.inner(f.start if f.absent is None else f.absent) for f, v in mine])
     return float(np.sqrt(np.mean(z**2 + np.diag(covariance))))
 
 
@@ -52,11 +53,13 @@ def springs_apart(fit: Fit, each: effects.Candidate) -> dict[str, float]:
 
 
 def with_spread(problem: Problem, fit: Fit) -> Fit:
-    """Return the fit with what is a run's own believed to lie as far apart as it does."""
+    """Return the fit with what is a run's own believed to lie as far apart as it does; not of a run alone of which more is known."""
     mine = [effect for effect in fit.spec.effects if effect in RUNS_OWN]
     for _ in range(ROUNDS if mine else 0):
         spread = {effect: max(1e-6, spread_of(fit, effect)) for effect in mine}
-        free = tuple(replace(f, prior=spread.get(f.effect or "", f.prior)) for f in fit.spec.free)
+        free = tuple(
+            replace(f, prior=spread.get(f.effect or "", f.prior)) if f.absent is None else f for f in fit.spec.free
+        )
         fit = problem.fit(replace(fit.spec, free=free), fit.as_dict(), tolerance=1e-5, errors=True)
     return fit
 

@@ -102,6 +102,18 @@ def rested(runs: Sequence[Run]) -> list[bool]:
     return found if sum(found) > 1 or one_of_others else [False] * len(runs)
 
 
+def above_logged(run: Run) -> float | None:
+    """Return by how much a run that begins at rest does so above the room that was logged, K; None where it does not, or none was.
+
+    A spring that nothing has heated is as warm as what it loses heat to.
+    """
+    if run.ambient_c is None or run.warm:
+        return None
+    first, apart = _begins_at(run)
+    above = first - float(run.ambient_c[0])
+    return above if apart <= TOGETHER_K and first <= HOTTEST_C and abs(above) <= 3.0 * ROOMS_K else None
+
+
 def believed(runs: Sequence[Run]) -> list[tuple[float, float]]:
     """Return between which temperatures, degC, a fit may look for each run's room; infinite where nothing is known of it.
 

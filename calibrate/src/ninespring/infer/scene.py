@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..model.effects import Scene
+from . import room
 from .problem import Problem
 
 FAN_ROWS = 20
@@ -29,6 +30,7 @@ def scene_of(problem: Problem) -> Scene:
         problem.base_value,
         len(runs),
         all(run.ambient_c is not None for run in runs),
+        room.above_logged(runs[0]) if len(runs) == 1 else None,
         any(run.load_n is not None and np.ptp(run.load_n) > 0.0 for run in runs),
         problem.reads_ohm,
     )

@@ -36,6 +36,8 @@ class Free:
     """Parameters of the plant to which it is added, times a weight, instead of being their value."""
     prior: float | None = None
     """Standard deviation, in the inner coordinate, of what is believed of it before: about its start."""
+    absent: float | None = None
+    """Value that it has where its effect is not there, if what is believed speaks against that, too."""
     ends: bool = False
     """Its bounds are the ends of what there is (none, all): a number that lies there is as good as any."""
 

@@ -106,6 +106,8 @@ class Scene:
     runs: int = 1
     ambient_logged: bool = False
     """In every run."""
+    begins_k: float | None = None
+    """By how much a run alone that begins at rest does so above its logged room, K."""
     load_moves: bool = False
     """A load was logged, and was not always the same."""
     reads_ohm: bool = False

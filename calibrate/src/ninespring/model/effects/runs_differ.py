@@ -7,12 +7,16 @@ They are of the measurement, not of the array: no model.toml has them. The plant
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from ..spec import AMBIENT_OFFSET, DRIVE_GAIN, RUN_AMBIENT, RUN_DRIVE, RUN_SENSOR, SENSOR_OFFSET, Free
 from .effect import Candidate, Effect, Numbers, Scene, percent, sized
 
 GAIN_SPREAD, OFFSET_SPREAD_K = 0.2, 3.0
 """What is believed before of how far runs lie apart: next to nothing; the data's own spread takes its place."""
+
+RESTED_K = 1.0
+"""How far from where a rested run begins its room is, one sigma (infer/room.py has the same of rooms that nobody logged)."""
 
 
 def _number(key: str, r: int) -> Free:
@@ -22,10 +26,20 @@ def _number(key: str, r: int) -> Free:
     return Free(run, 0.0, -20.0, 20.0, "K", run=r, prior=OFFSET_SPREAD_K)
 
 
+def _room_of_the_only(scene: Scene) -> Free:
+    """Return where the room of a run alone is: about where its springs rest, if they do, and not where it was logged."""
+    number = _number(AMBIENT_OFFSET, 0)
+    if scene.begins_k is None:
+        return number
+    return replace(number, start=scene.begins_k, prior=RESTED_K, absent=0.0)
+
+
 def _each_run(scene: Scene, key: str, shows: bool) -> Iterator[Candidate]:
     if not shows:
         return
     free = tuple(_number(key, r) for r in range(scene.runs))
+    if key == AMBIENT_OFFSET and scene.runs == 1:
+        free = (_room_of_the_only(scene),)
     still, moved = (1.0, 1.05) if key == DRIVE_GAIN else (0.0, 1.0)
     probes = tuple({f.key: moved if f is one else still for f in free} for one in free)
     # flexible: what is the array's own, and the same in all runs, comes first; the room of the only run is one number
