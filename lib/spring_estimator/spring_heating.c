@@ -142,6 +142,9 @@ static void hold_back(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
     const bool shows = b->steep || (b->learnt.austenite_ohm > 0.0f && !b->blind && waits);
     if (shows && b->run.heat.heat_k < most_heat_k(e, b, limit_c7)) {
         const spring_before_t before = spring_before(b, model, k);
+        if (!martensite && !b->steep) { /* only its level says so: it may be as hot as it was */
+            b->gone_k += spring_now_c(model, k) - spring_c(limit_c7);
+        }
         spring_set_temperature(model, k, spring_c(limit_c7), SPRING_PHASE_MARTENSITE);
         spring_note_on(e, model, k, SPRING_SIGHT_TRANSFORMS, &before, spring_c(limit_c7), 0.0f);
     }
