@@ -124,6 +124,9 @@ void console_add_setting_hint(const console_t *console, text_line_t *line)
         text_add_char(line, ' ');
         text_add(line, row.unit);
     }
+    if (row.part == PARAMETER_PART_SAFETY) {
+        text_add_flash(line, FLASH_TEXT(", for what docs/safety.md promises"));
+    }
 }
 
 #define ALIKE 3u /* so many first letters are no chance */
