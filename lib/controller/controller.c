@@ -354,12 +354,15 @@ static void raise_ceiling(controller_t *controller, uint8_t k)
                              measured_w > driven_w ? measured_w : driven_w);
     controller->heat_sum_uw[k] = 0;
     controller->duty_sum[k] = 0;
-    /* where one of two declarations must be wrong, no belief by either of them is waited for */
-    const int16_t trip_cc =
+    /* where one of two declarations must be wrong, no belief by either of them is waited for, and
+     * no tolerance around it */
+    const bool trips =
         temperature_ceiling_contradicts(&controller->ceiling, &controller->model, k)
-            ? controller->policy.parameters.temperature_limit_cc
-            : controller->safety.parameters.temperature_trip_cc;
-    if (temperature_ceiling_trips(&controller->ceiling, k, trip_cc)) {
+            ? temperature_ceiling_c(&controller->ceiling, k) >
+                  0.01f * (float)controller->policy.parameters.temperature_limit_cc
+            : temperature_ceiling_trips(&controller->ceiling, k,
+                                        controller->safety.parameters.temperature_trip_cc);
+    if (trips) {
         safety_trip(&controller->safety, k, SAFETY_FAULT_OVER_TEMPERATURE);
     }
 }

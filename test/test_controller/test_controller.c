@@ -383,8 +383,8 @@ TEST(heat_that_was_given_is_kept_over_a_warm_reset)
 }
 
 /* 2.35 A take it beyond 120 degC by what was declared as it became warm, and the belief is talked
- * away: the ceiling ends that at the trip, or a ninth above temperature_limit_c where another
- * declaration contradicts. */
+ * away: the ceiling ends that at the trip, or at temperature_limit_c where another declaration
+ * contradicts. */
 TEST(where_declarations_contradict_the_ceiling_trips_at_the_limit)
 {
     static const struct {
@@ -413,7 +413,7 @@ TEST(where_declarations_contradict_the_ceiling_trips_at_the_limit)
                 break;
             }
         }
-        const float limit_c = 20.0f + 90.0f / 0.9f;
+        const float limit_c = 110.0f;
         TEST_ASSERT_EQUAL(row[n].trips ? SAFETY_FAULT_OVER_TEMPERATURE : SAFETY_FAULT_NONE,
                           controller_fault(&controller, 4));
         TEST_ASSERT_TRUE(controller_delivered_c(&controller, 4) > limit_c - 0.5f);
