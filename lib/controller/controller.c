@@ -307,7 +307,7 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
     return sum_ma;
 }
 
-/* What was held against a spring by another belief is of no use. */
+/* What was held against a spring by another belief is another share by this one. */
 static void learn_source(controller_t *controller)
 {
     const circuit_source_t before = controller->source;
@@ -315,7 +315,7 @@ static void learn_source(controller_t *controller)
     current_control_set_drop(&controller->current, controller->source.driven_drop_mv);
     if (other) {
         circuit_peers_renew(&controller->peers, controller->springs, &before, &controller->source);
-        memset(controller->step, 0, sizeof controller->step);
+        circuit_step_renew(controller->step, controller->springs, &before, &controller->source);
     }
 }
 

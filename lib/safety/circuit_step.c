@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "fixed_point.h"
+
 #define Q12         4096.0f
 #define MOST        65535.0f
 #define CURRENT_MA  16.0f
@@ -9,6 +11,11 @@
 #define CHANGE_PART 0.10f /* of its resistance, that a spring makes in three windows */
 /* As others switch, and what a contact makes of it where the wiring is not as declared. */
 #define SHARE_PART 0.04f
+/* What is compared with goes along with a spring, or a supply, that moves by a sixteenth, or a
+ * thirty-second. */
+#define MOVED_OHM_SHIFT   4u
+#define MOVED_SHARE_SHIFT 5u
+#define SAME_DROP_MV      4.0f /* of 0.4 V behind a switch, 1 % */
 
 /* Of what is above 0. */
 static uint16_t to_q12(float value)
@@ -22,9 +29,34 @@ static bool is_like(uint8_t now, uint8_t was)
     return 3u * now >= 2u * was && 2u * now <= 3u * was;
 }
 
+static uint16_t apart(uint16_t a, uint16_t b)
+{
+    return a > b ? (uint16_t)(a - b) : (uint16_t)(b - a);
+}
+
 static bool is_off(uint16_t now, uint16_t was, float most_part, float most)
 {
-    return fabsf((float)now - (float)was) > most_part * (float)was + most;
+    return (float)apart(now, was) > most_part * (float)was + most;
+}
+
+/* Of a lie both move: of the current, the share by so much of it as shunt and wiring are of the
+ * loop, and the other way; of the voltage, by what the spring is of it. Either is a quarter of the
+ * loop at least. */
+static bool is_like_a_lie(const circuit_shown_t *now, const circuit_shown_t *was)
+{
+    const bool other_way = (now->share_q12 > was->share_q12) != (now->ohm_q12 > was->ohm_q12);
+    const uint32_t share = fixed_point_mac_u16(0, apart(now->share_q12, was->share_q12),
+                                               other_way ? now->ohm_q12 : was->ohm_q12);
+    const uint32_t all = fixed_point_mac_u16(0, apart(now->ohm_q12, was->ohm_q12), was->share_q12);
+    return share <= all && share >= all >> 2;
+}
+
+/* It has changed, and not as a lie that grows. */
+static bool has_moved(const circuit_shown_t *now, const circuit_shown_t *was)
+{
+    return (apart(now->ohm_q12, was->ohm_q12) > was->ohm_q12 >> MOVED_OHM_SHIFT ||
+            apart(now->share_q12, was->share_q12) > was->share_q12 >> MOVED_SHARE_SHIFT) &&
+           !is_like_a_lie(now, was);
 }
 
 /* A drop that is not the believed one takes as much of both voltages: one more than that makes the
@@ -73,7 +105,25 @@ bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
     } else if (odd) {
         step->odd = step->odd < CIRCUIT_STEP_WINDOWS ? (uint8_t)(step->odd + 1u) : step->odd;
     } else {
-        *step = (circuit_step_t){.was = {now, step->was[0]}};
+        circuit_shown_t *const first = &step->was[CIRCUIT_STEP_BACK - 1u];
+        if (first->share_q12 == 0 || has_moved(&now, first)) {
+            *first = step->was[0];
+        }
+        step->was[0] = now;
+        step->odd = 0;
     }
     return step->odd >= CIRCUIT_STEP_WINDOWS;
+}
+
+void circuit_step_renew(circuit_step_t steps[], uint8_t springs, const circuit_source_t *before,
+                        const circuit_source_t *now)
+{
+    const bool same_drop = fabsf(now->drop_mv - before->drop_mv) < SAME_DROP_MV;
+    const float part = same_drop ? before->step_mv / now->step_mv : 0.0f;
+    for (uint8_t k = 0; k < springs; k++) {
+        for (uint8_t n = 0; n < CIRCUIT_STEP_BACK; n++) {
+            uint16_t *const share_q12 = &steps[k].was[n].share_q12;
+            *share_q12 = to_q12(part * (1.0f / Q12) * (float)*share_q12);
+        }
+    }
 }

@@ -1,6 +1,7 @@
 /* What it is for: tells whether a spring's circuit has changed as a sensor does that begins to lie,
- * and no spring, contact or supply.
- * What it owns: what the last windows of one spring showed.
+ * at once or little by little, and no spring, contact or supply.
+ * What it owns: what the last window of one spring showed, and one since which nothing else has
+ * changed.
  * What it never does: look at another spring, latch a fault. It uses floating point, once in a
  * window. */
 #ifndef CIRCUIT_STEP_H
@@ -16,7 +17,7 @@
 extern "C" {
 #endif
 
-#define CIRCUIT_STEP_BACK    2u /* windows: the one in which it began shows a part of it */
+#define CIRCUIT_STEP_BACK    2u
 #define CIRCUIT_STEP_WINDOWS 2u /* on end */
 
 typedef struct {
@@ -27,24 +28,34 @@ typedef struct {
 
 /* Of one spring; all zero: nothing is known. */
 typedef struct {
-    circuit_shown_t was[CIRCUIT_STEP_BACK]; /* the last one first */
-    uint8_t odd;                            /* windows on end, which were not kept */
+    /* The last window; and the first since which resistance and share have moved by little, or as a
+     * lie that grows moves both: the last but one at the latest, as the one in which a lie begins
+     * shows a part of it. */
+    circuit_shown_t was[CIRCUIT_STEP_BACK];
+    uint8_t odd; /* windows on end, which were not kept */
 } circuit_step_t;
 
 /* Takes a spring's window. True if and only if for CIRCUIT_STEP_WINDOWS on end, at a current within
  * a half of what it was, resistance is off by more than 10 % AND the share of the expected voltage
  * that is found behind the switch by more than 4 % (and what 4 mV make of either) from what one of
- * the CIRCUIT_STEP_BACK windows before them showed. Supply and wiring change the share and not the
- * resistance; a contact changes the resistance and hardly the share; a spring changes its
+ * the CIRCUIT_STEP_BACK windows that are kept showed. Supply and wiring change the share and not
+ * the resistance; a contact changes the resistance and hardly the share; a spring changes its
  * resistance by a tenth in 1.8 s at the most (3 A, the least latent heat in print), and never the
  * share. A sensor that begins to show another part of its current changes the share by about half
- * of the lie. A window that tells nothing, of less than 0.1 V, of less than 16 mA or another
- * current ends what is known. */
+ * of the lie. The older of the two stays as long as resistance and share keep within 6 and 3 %, or
+ * move together as a lie moves them, by a fourth part to all of each other: so a lie that grows is
+ * found, however slowly it does. A window that tells nothing, of less than 0.1 V, of less than 16
+ * mA or another current ends what is known. */
 bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
                         const circuit_source_t *source,
                         const current_control_parameters_t *circuit);
 
-/* The share that the oldest of the windows before showed; 0: none is known. */
+/* Another supply is believed: of that, the voltages that the springs showed are another share. With
+ * another drop, too, each is another one by its duty, and what was known ends. */
+void circuit_step_renew(circuit_step_t steps[], uint8_t springs, const circuit_source_t *before,
+                        const circuit_source_t *now);
+
+/* The share that the older of the windows that are kept showed; 0: none is known. */
 static inline uint16_t circuit_step_before_q12(const circuit_step_t *step)
 {
     const circuit_shown_t *const oldest = &step->was[CIRCUIT_STEP_BACK - 1u];

@@ -177,6 +177,82 @@ TEST(what_it_showed_before_is_known)
     TEST_ASSERT_EQUAL_UINT(4096, circuit_step_before_q12(&step));
 }
 
+/* A share of what it is to come to, in so many windows; the gain or offset at which it is found, or
+ * as it was at the end. */
+static float found_on_its_way(shown_t from, unsigned field, float to, unsigned windows)
+{
+    setUp();
+    float *const value = (float *)&from + field;
+    const float begun = *value;
+    for (unsigned n = 0; n < windows; n++) {
+        *value = begun + (to - begun) * (float)n / (float)windows;
+        if (takes(from)) {
+            return *value;
+        }
+    }
+    return to;
+}
+
+/* In one minute, or in fifty. */
+TEST(a_lie_that_grows_is_found_however_slowly)
+{
+    static const struct {
+        unsigned field;
+        float to, least, most;
+    } lies[] = {
+        {CURRENT_GAIN, 0.4f, 0.85f, 0.92f},  {CURRENT_GAIN, 1.6f, 1.08f, 1.17f},
+        {VOLTAGE_GAIN, 0.4f, 0.85f, 0.92f},  {VOLTAGE_GAIN, 1.6f, 1.08f, 1.16f},
+        {OFFSET_A, -0.5f, -0.17f, -0.06f},   {OFFSET_A, 0.5f, 0.06f, 0.14f},
+        {OFFSET_MV, -90.0f, -30.0f, -12.0f}, {OFFSET_MV, 90.0f, 12.0f, 30.0f},
+    };
+    static const unsigned lasts[] = {100, 500, 1500, 5000};
+    for (unsigned n = 0; n < ROWS(lies); n++) {
+        for (unsigned k = 0; k < ROWS(lasts); k++) {
+            const float found =
+                found_on_its_way(with(0.9f, SHOWN, 0.9f), lies[n].field, lies[n].to, lasts[k]);
+            TEST_ASSERT_TRUE(found > lies[n].least);
+            TEST_ASSERT_TRUE(found < lies[n].most);
+        }
+    }
+}
+
+/* A spring transforms, its contact creeps, supply and wiring move: each at its own pace. */
+TEST(what_grows_and_is_no_lie_passes)
+{
+    static const unsigned lasts[] = {10, 40, 100, 500, 5000};
+    for (unsigned k = 0; k < ROWS(lasts); k++) {
+        for (unsigned wired = 0; wired < 3; wired++) {
+            const float ways[][2] = {{SPRING, 0.29f}, {SPRING, 0.17f}, {SPRING, 0.5f},
+                                     {SUPPLY, 0.8f},  {SUPPLY, 1.2f},  {WIRING, 0.3f}};
+            for (unsigned n = 0; n < ROWS(ways); n++) {
+                shown_t from = honest;
+                from.wiring_ohm = 0.14f + 0.04f * (float)wired;
+                const unsigned field = (unsigned)ways[n][0];
+                TEST_ASSERT_EQUAL_FLOAT(ways[n][1],
+                                        found_on_its_way(from, field, ways[n][1], lasts[k]));
+            }
+        }
+    }
+}
+
+/* One end of a cable moves by a twentieth, and back. */
+TEST(a_spring_that_transforms_as_others_switch_passes)
+{
+    for (unsigned lasts = 10; lasts < 200; lasts += 7) {
+        for (unsigned at = 0; at < lasts; at++) {
+            for (int by = -5; by <= 5; by++) {
+                setUp();
+                shown_t s = honest;
+                for (unsigned n = 0; n < lasts; n++) {
+                    s.spring_ohm = 0.175f + 0.044f * (float)n / (float)lasts;
+                    s.supply = n < at ? 1.0f : 1.0f + 0.01f * (float)by;
+                    TEST_ASSERT_FALSE(takes(s));
+                }
+            }
+        }
+    }
+}
+
 /* As it lies now it was never seen at this current: what was before another one is long ago. */
 TEST(another_current_ends_what_was_known)
 {
