@@ -120,6 +120,18 @@ events pulses(double period_s, double lasts_s, event one)
     return all;
 }
 
+/* Of its current, ever less. */
+events falls(double part, double period_s)
+{
+    events all;
+    double shows = 1.0;
+    for (double at_s = 0.0; at_s < 40.0; at_s += period_s) {
+        shows *= part;
+        all.push_back(at(at_s, kind::scaled, 0, shows));
+    }
+    return all;
+}
+
 /* The fault stays, and who uses the board says this again and again. */
 events insists(event fault, double period_s, std::initializer_list<const char *> lines)
 {
@@ -242,6 +254,14 @@ std::vector<injected> catalogue()
         {"sensor shows 1.3 of its voltage", {at(0, k::volt_scaled, 0, 1.3)}},
         {"drifts -1 % a minute", {at(0, k::drifts, 0, -0.01)}},
         {"drifts -60 % a minute", {at(0, k::drifts, 0, -0.6)}},
+        {"drifts -30 % a minute", {at(0, k::drifts, 0, -0.3)}},
+        {"drifts -10 % a minute", {at(0, k::drifts, 0, -0.1)}},
+        {"voltage drifts -60 % a minute", {at(0, k::volt_drifts, 0, -0.6)}},
+        {"voltage drifts -20 % a minute", {at(0, k::volt_drifts, 0, -0.2)}},
+        {"offset creeps -0.5 A a minute", {at(0, k::creeps, 0, -0.5)}},
+        {"gain falls by 8 % each 3 s", falls(0.92, 3.0)},
+        {"shows 0.8 for a second, each 2 s", pulses(2.0, 1.0, at(0, k::scaled, 0, 0.8))},
+        {"shows nothing for 60 ms, each 0.3 s", pulses(0.3, 0.06, at(0, k::saturates, 0, 0.001))},
         {"drifts +60 % a minute", {at(0, k::drifts, 0, 0.6)}},
         {"saturates at 0.5 A", {at(0, k::saturates, 0, 0.5)}},
         {"saturates at 1.6 A", {at(0, k::saturates, 0, 1.6)}},
@@ -342,6 +362,7 @@ std::vector<injected> catalogue()
         {"martensite start 2 K lower declared", {say(0, "$martensite_start_c=76")}},
         {"losses x 3.4 declared", {say(0, "$loss_w_per_k=0.0197")}},
         {"heat capacity x 10 declared", {say(0, "$heat_capacity_j_per_k=3")}},
+        {"heat capacity of one x 3 declared", {say(0, "$heat_capacity_scale_1=3")}},
         {"air of -40 degC declared", {say(0, "ambient -40")}},
     };
 }

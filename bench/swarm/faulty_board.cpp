@@ -148,6 +148,10 @@ void faulty_board::inflict_on_sensor(const event &e)
         return lies(lie::stuck_bit);
     case kind::drifts:
         return lies(lie::drifts);
+    case kind::creeps:
+        return lies(lie::creeps);
+    case kind::volt_drifts:
+        return lies(lie::volt_drifts);
     case kind::saturates:
         return lies(lie::saturates);
     case kind::offset:

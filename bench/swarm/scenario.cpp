@@ -17,16 +17,16 @@ namespace
 {
 
 constexpr std::array<const char *, static_cast<std::size_t>(kind::count)> names = {
-    "say",         "bytes",         "open",         "shorted",     "closed",      "absent",
-    "stale",       "frozen",        "scaled",       "swapped",     "unset",       "sda",
-    "worn",        "torn",          "power",        "brown_out",   "button",      "hang",
-    "crystal",     "enable_low",    "enable_high",  "fan_stops",   "interrupt",   "flip",
-    "stress",      "supply",        "ambient",      "leaks",       "slow_switch", "welds_hot",
-    "diode_open",  "bridged",       "warm_contact", "chatters",    "ground",      "ripple",
-    "clock",       "gates_swapped", "thermistor",   "volt_scaled", "stuck_bit",   "drifts",
-    "saturates",   "offset",        "lifted",       "bursts",      "nacks",       "garbled",
-    "answers_too", "slow_bus",      "repeats",      "hears",       "voltage_of",  "lags",
-    "noisy",       "gates_joined",  "no_inductor",  "weak_supply"};
+    "say",        "bytes",         "open",         "shorted",      "closed",      "absent",
+    "stale",      "frozen",        "scaled",       "swapped",      "unset",       "sda",
+    "worn",       "torn",          "power",        "brown_out",    "button",      "hang",
+    "crystal",    "enable_low",    "enable_high",  "fan_stops",    "interrupt",   "flip",
+    "stress",     "supply",        "ambient",      "leaks",        "slow_switch", "welds_hot",
+    "diode_open", "bridged",       "warm_contact", "chatters",     "ground",      "ripple",
+    "clock",      "gates_swapped", "thermistor",   "creeps",       "volt_drifts", "volt_scaled",
+    "stuck_bit",  "drifts",        "saturates",    "offset",       "lifted",      "bursts",
+    "nacks",      "garbled",       "answers_too",  "slow_bus",     "repeats",     "hears",
+    "voltage_of", "lags",          "noisy",        "gates_joined", "no_inductor", "weak_supply"};
 
 class dice
 {

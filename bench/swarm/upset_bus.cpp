@@ -61,10 +61,15 @@ bool upset_bus::acknowledges(unsigned k)
     return !one_in(of(lie::nacks, k));
 }
 
+double upset_bus::minutes(unsigned k) const
+{
+    return (board_time_s(board_) - since_s_[k]) / 60.0;
+}
+
 double upset_bus::lied_a(unsigned k, double current_a) const
 {
-    const double minutes = (board_time_s(board_) - since_s_[k]) / 60.0;
-    const double lied_a = current_a * (1.0 + of(lie::drifts, k) * minutes) + of(lie::offset, k);
+    const double lied_a = current_a * (1.0 + of(lie::drifts, k) * minutes(k)) +
+                          of(lie::creeps, k) * minutes(k) + of(lie::offset, k);
     const double end_a = of(lie::saturates, k);
     return end_a > 0.0 ? std::clamp(lied_a, -end_a, end_a) : lied_a;
 }
@@ -123,7 +128,8 @@ std::uint16_t upset_bus::reads(unsigned k, unsigned number, std::uint16_t value)
         }
         const double late_v = lagging(k, VOLTAGE, V_OF_BIT * (value >> 3));
         value = of(lie::lags, k) > 0.0 ? voltage_register(late_v, value) : value;
-        const double lift_v = of(lie::lifted, k) + noise * random_noise(&dice_);
+        const double drifted_v = of(lie::volt_drifts, k) * minutes(k) * V_OF_BIT * (value >> 3);
+        const double lift_v = drifted_v + of(lie::lifted, k) + noise * random_noise(&dice_);
         value = lift_v == 0.0 ? value : voltage_register(V_OF_BIT * (value >> 3) + lift_v, value);
     }
     if (number == CURRENT || number == VOLTAGE) {

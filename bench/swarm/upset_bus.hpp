@@ -17,6 +17,8 @@ namespace swarm
 enum class lie {
     stuck_bit,   /* 1..32: 16 of the current's register, 16 of the voltage's; below 0: stuck at 0 */
     drifts,      /* its current, by this share a minute */
+    creeps,      /* A beside its current, a minute */
+    volt_drifts, /* its voltage, by this share a minute */
     saturates,   /* its current, at so many A */
     offset,      /* A beside its current */
     lifted,      /* V beside its voltage */
@@ -47,6 +49,7 @@ private:
     bool one_in(double n);
     bool acknowledges(unsigned k);
     std::uint16_t reads(unsigned k, unsigned number, std::uint16_t value);
+    double minutes(unsigned k) const;
     double lied_a(unsigned k, double current_a) const;
     std::uint16_t repeated(unsigned k, unsigned number, std::uint16_t value);
     double lagging(unsigned k, unsigned number, double value);
