@@ -144,12 +144,13 @@ bool circuit_check_judge(circuit_check_t *c, const circuit_source_t *source, uin
         const float slope_variance = SLOPE_SHARE * SLOPE_SHARE * duty * duty;
         const bool tells = variance >= fmaxf(LEAST_VARIANCE, slope_variance);
         const float all_mv = found_mv + source->drop_mv - source->less_mv; /* that go with it */
-        const bool other = follows_mv * duty < LEAST_FOLLOWS * variance * all_mv ||
-                           follows_mv > MOST_SLOPE * should_mv;
+        const bool other = tells && (follows_mv * duty < LEAST_FOLLOWS * variance * all_mv ||
+                                     follows_mv > MOST_SLOPE * should_mv);
         /* else the drop may take all of it, and nothing follows */
         const bool flows = expected_mv >= source->unsure_mv;
-        astray = flows && ((tells && other) || (variance >= LEAST_VARIANCE &&
-                                                stands(c, should_mv * step_mv, found_mv)));
+        astray =
+            flows &&
+            (other || (variance >= LEAST_VARIANCE && stands(c, should_mv * step_mv, found_mv)));
         const float off_mv = found_mv - declared_mv;
         unbalanced = fabsf(off_mv) > BALANCE_SHARE * declared_mv + BALANCE_MV +
                                          (off_mv < 0.0f ? source->more_mv : source->less_mv);

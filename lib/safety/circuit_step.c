@@ -36,7 +36,9 @@ static uint16_t apart(uint16_t a, uint16_t b)
 
 static bool is_off(uint16_t now, uint16_t was, float most_part, float most)
 {
-    return (float)apart(now, was) > most_part * (float)was + most;
+    const uint16_t by = apart(now, was);
+    /* as a rule: no floating point; either share is above a thirty-second */
+    return by > was >> MOVED_SHARE_SHIFT && (float)by > most_part * (float)was + most;
 }
 
 /* Of a lie both move: of the current, the share by so much of it as shunt and wiring are of the
