@@ -451,8 +451,8 @@ TEST(finish_is_heat_without_a_change)
 
 /* While it still changes, or lacks phase that it is known to have, it is no hotter than austenite
  * finish (martensite: its onset), until the coldest and heaviest would be. Where only the level of
- * its resistance says so, which a sensor's step may have moved, that stays a doubt: it may be as hot
- * as it was. */
+ * its resistance says so, which a sensor's step may have moved, that stays a doubt: it may be as
+ * hot as it was. */
 TEST(what_still_transforms_is_no_hotter_than_that_lets_it_be)
 {
     static const struct {
