@@ -43,6 +43,7 @@ from ninespring.model.models import Array, Model
 from ninespring.model.simulate import simulate_run
 from world import EFFECTS, OUTSIDE
 
+GROUPS = ("single", "pair", "none", "outside", "beside", "alloy")
 MATTERS = 0.5
 """An effect counts where it leaves at least this much structure, rms in units of the noise."""
 
@@ -388,7 +389,7 @@ def main() -> int:
     )
     parser.add_argument("--quick", action="store_true", help="one seed of singles and none, for CI")
     parser.add_argument("--development", action="store_true", help="seeds of the development range")
-    parser.add_argument("--groups", default="single,pair,none,outside,beside,alloy")
+    parser.add_argument("--groups", default=",".join(GROUPS), help="which, comma-separated (default: all)")
     parser.add_argument(
         "--only",
         default="",
@@ -408,6 +409,8 @@ def main() -> int:
     if first is None:
         first = (DEVELOPMENT_SEEDS if options.development else REPORTING_SEEDS).start
     groups = ("single", "none") if options.quick else tuple(options.groups.split(","))
+    if unknown := [one for one in groups if one not in GROUPS]:
+        parser.error(f"no group is called {', '.join(unknown)}: {', '.join(GROUPS)}")
     jobs = plan(range(first, first + (1 if options.quick else options.seeds)), groups)
     if options.only:
         wanted = set(options.only.split(","))

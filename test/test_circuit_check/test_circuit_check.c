@@ -326,6 +326,26 @@ TEST(what_is_not_known_of_the_drop_is_let_pass)
     }
 }
 
+/* Of 838 mV behind a switch a drop takes its part, and all of them go with the duty: 0.7 of that
+ * must be seen, less what is not known of the drop. */
+TEST(what_follows_is_held_against_all_that_goes_with_the_duty)
+{
+    static const struct {
+        float drop_mv, less_mv;
+        double share;
+        int windows;
+    } table[] = {{0, 0, 0.71, 9},   {0, 0, 0.69, 2},    {350, 0, 0.71, 9},   {350, 0, 0.69, 2},
+                 {0, 200, 0.54, 9}, {0, 200, 0.52, 2},  {350, 200, 0.54, 9}, {350, 200, 0.52, 2},
+                 {0, 0, 2.49, 9},   {350, 200, 2.51, 2}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        source.drop_mv = table[n].drop_mv;
+        source.less_mv = table[n].less_mv;
+        row(n);
+        TEST_ASSERT_EQUAL_INT(table[n].windows,
+                              windows(120, 30, table[n].share, -table[n].drop_mv, 0.0));
+    }
+}
+
 /* One window is enough to doubt it: 120 steps, how much of the sweep is followed, what is beyond.
  */
 TEST(a_window_of_no_circuit_is_not_sound)

@@ -253,6 +253,61 @@ TEST(a_spring_that_transforms_as_others_switch_passes)
     }
 }
 
+/* What is compared with stays while resistance and share keep within a sixteenth and a
+ * thirty-second of it, or move as one lie moves both: of a current the other way, of a voltage the
+ * same. */
+TEST(what_moves_otherwise_than_a_lie_is_compared_with_anew)
+{
+    static const struct {
+        uint16_t share_q12, ohm_q12; /* 4096 and 1600 before */
+        bool stays;
+    } table[] = {
+        {4096, 1700, true}, {4096, 1701, false}, {4096, 1500, true}, {4096, 1499, false},
+        {4224, 1600, true}, {4225, 1600, false}, {3968, 1600, true}, {3967, 1600, false},
+        {4480, 1750, true}, {4481, 1750, false}, {4192, 1750, true}, {4191, 1750, false},
+        {3745, 1750, true}, {3744, 1750, false}, {4008, 1750, true}, {4009, 1750, false},
+        {3712, 1450, true}, {3711, 1450, false}, {4519, 1450, true}, {4520, 1450, false},
+    };
+    const circuit_shown_t before = {4096, 1600, 62}, last = {4100, 1601, 62};
+    for (unsigned n = 0; n < ROWS(table); n++) {
+        step = (circuit_step_t){.was = {last, before}, .odd = 1};
+        const float found_mv = 1e3f * (((float)table[n].ohm_q12 + 0.25f) / 4096.0f + 0.18f);
+        const circuit_window_t window = {
+            found_mv, found_mv * 4096.0f / ((float)table[n].share_q12 + 0.25f), 1e3f, true, true,
+            0.0f};
+        TEST_ASSERT_FALSE(circuit_step_judge(&step, &window, &source, &circuit));
+        TEST_ASSERT_EQUAL_UINT(table[n].share_q12, step.was[0].share_q12);
+        TEST_ASSERT_EQUAL_UINT(table[n].ohm_q12, step.was[0].ohm_q12);
+        TEST_ASSERT_EQUAL_UINT(table[n].stays ? before.ohm_q12 : last.ohm_q12, step.was[1].ohm_q12);
+        TEST_ASSERT_EQUAL_UINT(0, step.odd);
+    }
+}
+
+/* Of a supply that is believed a quarter higher it showed 0.8; with another drop nothing is known.
+ */
+TEST(another_belief_of_the_supply_makes_another_share)
+{
+    static const struct {
+        float drop_mv;
+        bool known;
+    } table[] = {{350.0f, true}, {353.9f, true},  {354.0f, false}, {354.1f, false},
+                 {346.1f, true}, {345.9f, false}, {0.0f, false}};
+    const circuit_source_t before = {.step_mv = 10.0f, .drop_mv = 350.0f};
+    for (unsigned n = 0; n < ROWS(table); n++) {
+        const circuit_step_t was = {.was = {{4096, 900, 62}, {2000, 901, 61}}, .odd = 1};
+        circuit_step_t steps[3] = {was, was, was};
+        const circuit_source_t now = {.step_mv = 12.5f, .drop_mv = table[n].drop_mv};
+        circuit_step_renew(steps, 2, &before, &now);
+        for (unsigned k = 0; k < 2; k++) {
+            TEST_ASSERT_UINT_WITHIN(1, table[n].known ? 3277 : 0, steps[k].was[0].share_q12);
+            TEST_ASSERT_UINT_WITHIN(1, table[n].known ? 1600 : 0, steps[k].was[1].share_q12);
+            TEST_ASSERT_EQUAL_UINT(900, steps[k].was[0].ohm_q12);
+            TEST_ASSERT_EQUAL_UINT(901, steps[k].was[1].ohm_q12);
+        }
+        TEST_ASSERT_EQUAL_MEMORY(&was, &steps[2], sizeof was); /* no spring of this array */
+    }
+}
+
 /* As it lies now it was never seen at this current: what was before another one is long ago. */
 TEST(another_current_ends_what_was_known)
 {
