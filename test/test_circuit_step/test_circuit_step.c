@@ -303,6 +303,7 @@ TEST(another_belief_of_the_supply_makes_another_share)
             TEST_ASSERT_UINT_WITHIN(1, table[n].known ? 1600 : 0, steps[k].was[1].share_q12);
             TEST_ASSERT_EQUAL_UINT(900, steps[k].was[0].ohm_q12);
             TEST_ASSERT_EQUAL_UINT(901, steps[k].was[1].ohm_q12);
+            TEST_ASSERT_EQUAL_UINT(1, steps[k].odd);
         }
         TEST_ASSERT_EQUAL_MEMORY(&was, &steps[2], sizeof was); /* no spring of this array */
     }
