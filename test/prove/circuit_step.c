@@ -23,5 +23,9 @@ void main(void)
             .tells = any_bool(),
         };
         (void)circuit_step_judge(&step, &window, &source, &settings);
+        if (any_bool()) {
+            const circuit_source_t now = any_source();
+            circuit_step_renew(&step, 1, &source, &now);
+        }
     }
 }
