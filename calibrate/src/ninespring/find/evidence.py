@@ -59,10 +59,7 @@ def fit_factor(problem: Problem, fit: Fit) -> float:
     if problem.colour is not None:
         return 1.0
     if not math.isfinite(fit.factor):
-        fit.factor = statistics.correlation_factor(
-            [left / noise for left, noise in zip(fit.residual, problem.noise, strict=True)],
-            problem.longest_lag(),
-        )
+        fit.factor = problem.alike([left / noise for left, noise in zip(fit.residual, problem.noise, strict=True)])
     return fit.factor
 
 

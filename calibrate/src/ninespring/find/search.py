@@ -459,8 +459,7 @@ class Search:
     def downward(self, current: Fit) -> Fit:
         """Return the best fit of causes that only help together, pruned; `current` where none is better."""
         screen = self.screen(self.base)
-        sets = self.together(self.base)
-        sets = [one for one in sets if len(screen.forecast(one)[1]) == len(one)]
+        sets = [one for one in self.together(self.base) if len(screen.forecast(one)[1]) == len(one)]
         for chosen in [*sets, *self._anywhere(screen.candidates, sets)]:
             if not self.goes_on() or excess(self.problem, current) < MIN_GAIN**2:
                 break

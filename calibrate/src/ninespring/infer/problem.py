@@ -413,14 +413,19 @@ class Problem:
             out.append(left)
         return out
 
-    def alike(self, vector: np.ndarray) -> float:
-        """Return how many readings of what a model leaves, (count,) in units of the noise, carry what one of its own would."""
+    def alike(self, left: Sequence[np.ndarray]) -> float:
+        """Return how many readings of what a model leaves, per run (rows, springs) in units of the noise, carry what one of its
+        own would."""
         if self.colour is not None:
             return 1.0  # innovations are white
+        return statistics.correlation_factor(left, self.longest_lag())
+
+    def in_place(self, vector: np.ndarray) -> list[np.ndarray]:
+        """Return a vector (count,) as it was read, per run (rows, springs); nan where nothing counts."""
         fields = [np.full(mask.shape, np.nan) for mask in self.mask]
         for field, mask, part in zip(fields, self.mask, self.by_run(vector), strict=True):
             field[mask] = part
-        return statistics.correlation_factor(fields, self.longest_lag())
+        return fields
 
     # ---- fitting ----------------------------------------------------------------------------------------
 
@@ -484,7 +489,10 @@ class Problem:
             return shown, self.vector(self.residuals(shown))
 
         way = Descent(
-            free, show, lambda numbers, shown, columns: self.jacobian(spec, numbers, shown, columns), self.alike
+            free,
+            show,
+            lambda numbers, shown, columns: self.jacobian(spec, numbers, shown, columns),
+            lambda vector: self.alike(self.in_place(vector)),
         )
         if near is not None and near.jacobian is not None and len(near.jacobian) == self.count:
             way.begin_near(near)
@@ -577,10 +585,7 @@ class Problem:
         jac = fit.jacobian = self.jacobian(fit.spec, fit.values, self.predictions(fit.spec, fit.values))
         used = [k for k, f in enumerate(fit.spec.free) if f.key not in fit.stuck]
         covariance = np.full((jac.shape[1], jac.shape[1]), 0.0)
-        fit.factor = 1.0  # innovations are white
-        if self.colour is None:
-            series = [left / noise for left, noise in zip(fit.residual, self.noise, strict=True)]
-            fit.factor = statistics.correlation_factor(series, self.longest_lag())
+        fit.factor = self.alike([left / noise for left, noise in zip(fit.residual, self.noise, strict=True)])
         if used:
             spread = max(1.0, fit.chi2 / max(1, fit.count - len(used)))
             trust = np.array([f.trust for f in fit.spec.free])[used]
