@@ -22,9 +22,9 @@ typedef struct {
 void spring_away_turn(spring_away_t *away, bool there);
 /* True if and only if it is not there 85 s after it was asked, or 15 s after it left. */
 bool spring_away_says(const spring_away_t *away);
-/* It has lost its phase: true, and a try is taken, if it may be heated again. There are four (a
- * doubted heating and the one that proves it, for a load that comes and goes), one more every ten
- * minutes, and one for each 15 s in which it is there. Else it stays as it is. */
+/* It has lost its phase: true, and a try is taken, if it may be heated again. There are four
+ * (for a load that comes and goes), one more every ten minutes, and one for each 15 s in which it
+ * is there. Else it stays as it is. */
 bool spring_away_try(spring_away_t *away);
 
 #ifdef __cplusplus

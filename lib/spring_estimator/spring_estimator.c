@@ -569,33 +569,24 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     /* neither has it come to its finish, nor is that seen */
     const bool unproven = full && b->heating && !spring_estimator_has_transformed(e, model, k) &&
                           !surely_finished(b, model, k, 0.0f);
-    const bool lacks =
-        full && b->possible != SPRING_PHASE_AUSTENITE && spring_estimator_lacks_phase(b, model, k);
-    const float phase = lacks ? spring_phase_by_resistance(b) : 1.0f; /* as it read last */
     const spring_before_t before = spring_before(b, model, k);
     const bool unseen = full && b->heating && b->possible != SPRING_PHASE_AUSTENITE;
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {
-        b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE;
+        /* as hot as it may be, and what it reads shows none of it, or says that phase is missing */
+        b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE ||
+                   spring_estimator_lacks_phase(b, model, k);
         b->possible = SPRING_PHASE_AUSTENITE;
         spring_set_temperature(model, k, spring_now_c(model, k), SPRING_PHASE_AUSTENITE);
     } else if (!full && b->possible == SPRING_PHASE_AUSTENITE) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
     }
-    /* as hot as it takes whatever it reads, or ended twice by a limit: what it reads tells nothing
-     */
-    const bool certain = lacks && ((b->heating && spring_heated_enough(e, b, model, k)) ||
-                                   surely_finished(b, model, k, SPRING_ESTIMATOR_BOUND_SDS));
-    const bool wrong = certain || (lacks && b->doubted);
-    b->blind = b->blind || wrong;
-    b->doubted = lacks && !b->blind;
-    if (full && !lacks && b->heating && b->onset && spring_estimator_sees(b) &&
-        b->current_a > STRONG_A) {
+    if (full && b->heating && b->onset && spring_estimator_sees(b) && b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
     }
     b->heating = b->left = false;
     b->unproven = unproven;
     b->kept_w_per_k = 0.0f;
-    b->lost = b->doubted ? 1.0f - phase : 0.0f;
+    b->lost = 0.0f;
     b->quiet = 0;
     b->losing = 0;
     const bool strong = full && b->reads && b->current_a > STRONG_A;
@@ -603,7 +594,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     if (unseen) {
         spring_note(e, model, k, SPRING_SIGHT_UNSEEN, &before, 0.0f, 0.0f);
     }
-    spring_note_did(e, k, b->doubted ? SPRING_DID_HOLD | SPRING_DID_DOUBT : SPRING_DID_HOLD);
+    spring_note_did(e, k, SPRING_DID_HOLD);
     spring_seal(e, k);
     spring_seal_shared(e);
 }

@@ -124,7 +124,6 @@ typedef struct {
     uint8_t averaged;   /* turns in slow_ohm, saturating */
     uint16_t unsteady;  /* turns, of all that a contact or the sensor has jumped lately */
     /* bits: of nine springs they are a good part of the RAM that is spare */
-    bool doubted : 1;  /* its last heating ended before its resistance said so */
     bool unproven : 1; /* since its heating its contact came and went: what it seemed to gain may
                         * have been that */
     bool odd : 1;      /* the turn before read what no phase changes to so fast */

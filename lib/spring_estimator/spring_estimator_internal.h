@@ -190,9 +190,6 @@ void spring_learn_austenite(spring_belief_t *belief);
 
 /* A hold begins. Now: what the last turn read is what it reads with the phase that it has. */
 void spring_begin_hold_line(const spring_estimator_t *estimator, spring_belief_t *belief, bool now);
-/* Even the coldest and heaviest spring has transformed by the heat of this heating. */
-bool spring_heated_enough(const spring_estimator_t *estimator, const spring_belief_t *belief,
-                          const thermal_model_t *model, uint8_t spring);
 /* What the sensor's offset may add to a resistance from one current to another, relative. */
 float spring_offset_may_show(const spring_belief_t *belief, float ohm, float from_a, float to_a);
 /* While it heats: what heat does to its resistance. */

@@ -114,13 +114,6 @@ static float most_heat_k(const spring_estimator_t *e, const spring_belief_t *b, 
     return (spring_c(limit_c7) + shift_k - b->run.heat.begun_c + latent_k) * CAPACITY_BOUND;
 }
 
-bool spring_heated_enough(const spring_estimator_t *e, const spring_belief_t *b,
-                          const thermal_model_t *model, uint8_t k)
-{
-    return b->run.heat.heat_k >=
-           most_heat_k(e, b, thermal_model_transformation(model, k).austenite_finish_c7);
-}
-
 /* A spring that still transforms, or is known to show it and has not yet, is not hotter than that
  * lets it be, whatever the model says, until it must have come so far. Where it pauses, heat warms
  * it. */

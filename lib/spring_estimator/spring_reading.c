@@ -50,33 +50,25 @@ static void note_jump(spring_estimator_t *e, const thermal_model_t *model, uint8
     spring_note_read(e, k, by, noise);
 }
 
-/* No phase changes so fast: it is a contact or the sensor. A turn in which it may have jumped half
- * way is left out. */
+/* In a hold no phase changes so fast: it is a contact or the sensor. A turn in which it may have
+ * jumped half way is left out. */
 static bool leave_out(spring_estimator_t *e, const thermal_model_t *model, uint8_t k, float ohm,
                       float current_a)
 {
     spring_belief_t *b = &e->spring[k];
-    const bool holds = !b->heating && b->run.line.ohm > 0.0f;
-    const float was_ohm = holds ? b->slow_ohm : b->ohm_before[0];
+    const float was_ohm = b->slow_ohm;
     const float step = ohm - was_ohm;
-    const float likely = holds ? JUMP_OF_HOLD : JUMP_OF_LOAD;
-    if (fabsf(step) <= likely * was_ohm || b->fresh == 0 || was_ohm <= 0.0f) {
+    if (b->heating || b->run.line.ohm <= 0.0f || fabsf(step) <= JUMP_OF_HOLD * was_ohm ||
+        b->fresh == 0) {
         b->odd = false;
         return false;
     }
-    /* a line compares with any current, but for the sensor's offset; a heating with none that has
-     * doubled */
-    const bool compares =
-        holds ? current_a > WEAK_A
-              : current_a > STRONG_A && b->current_a > fmaxf(STRONG_A, 0.5f * current_a);
     /* no hold gains phase at once; it loses it by a load, where no contact has moved lately */
     const bool by_load = step * b->learnt.change < 0.0f && b->unsteady == 0;
-    const float least = !holds || by_load ? JUMP_OF_LOAD : JUMP_OF_HOLD;
     const float noise = b->noise * fmaxf(b->current_a / current_a, 1.0f); /* it is the voltage's */
-    const float offset =
-        holds ? spring_offset_may_show(b, was_ohm, b->run.line.a, current_a) : 0.0f;
-    const float most = least + SURE_SDS * noise + offset;
-    const bool jumps = compares && fabsf(step) > most * was_ohm;
+    const float most = (by_load ? JUMP_OF_LOAD : JUMP_OF_HOLD) + SURE_SDS * noise +
+                       spring_offset_may_show(b, was_ohm, b->run.line.a, current_a);
+    const bool jumps = current_a > WEAK_A && fabsf(step) > most * was_ohm;
     if (jumps && b->odd) {
         spring_jump(b, ohm / was_ohm);
         note_jump(e, model, k, step / was_ohm, noise);

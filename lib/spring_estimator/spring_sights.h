@@ -40,8 +40,7 @@ enum {
     SPRING_DID_HOLD = 2,  /* a hold began */
     SPRING_DID_BLIND = 4, /* from here on its resistance tells nothing */
     SPRING_DID_OPEN =
-        8, /* the surroundings have stepped: its loss and another spring's were opened */
-    SPRING_DID_DOUBT = 16 /* its resistance says that phase is still missing */
+        8 /* the surroundings have stepped: its loss and another spring's were opened */
 };
 
 #define SPRING_SIGHT_SD_MOST UINT8_MAX /* a standard deviation of that or more */

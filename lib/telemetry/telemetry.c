@@ -228,7 +228,7 @@ static void add_sight(piece_t *piece, const spring_sight_t *sight, const text_ti
     static const char kinds[] FLASH_MEMORY =
         "onset\0finish\0unseen\0lost\0kept\0transforms\0jumped\0looked\0told\0"
         "cooled\0anew";
-    static const char deeds[] FLASH_MEMORY = "heated\0held\0blind\0opened\0doubted";
+    static const char deeds[] FLASH_MEMORY = "heated\0held\0blind\0opened";
     text_line_t *const line = &piece->line;
     piece->values[0] = sight->spring + 1;
     add(piece, FLASH_TEXT("<sight|spring:#0|t:"));

@@ -235,7 +235,7 @@ TEST(longest_sight_is_told_whole_and_waits_for_room)
     *spring_sights_add(sights, 8) = (spring_sight_t){.number = sights->numbers - 1u,
                                                      .spring = 8,
                                                      .kind = SPRING_SIGHT_TRANSFORMS,
-                                                     .did = 31,
+                                                     .did = 15,
                                                      .read = INT16_MIN,
                                                      .read_sd = 255,
                                                      .believed_sd = 255,
@@ -256,7 +256,7 @@ TEST(longest_sight_is_told_whole_and_waits_for_room)
     const text_time_t years = {INT32_MAX, 999};
     room = 329;
     telemetry_tick(&telemetry, &controller, &years, 0, &output);
-    TEST_ASSERT_EQUAL_UINT(1, occurrences("|opened|doubted>\r\n"));
+    TEST_ASSERT_EQUAL_UINT(1, occurrences("|blind|opened>\r\n"));
     TEST_ASSERT_EQUAL_UINT(1, lines());
 }
 
