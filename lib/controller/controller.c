@@ -188,6 +188,9 @@ static bool declare(controller_t *controller, const thermal_model_parameters_t *
     thermal_model_t *const model = &controller->model;
     declared_t before[CONTROLLER_MAX_SPRINGS];
     for (uint8_t k = 0; k < controller->springs; k++) {
+        if (controller->duty_sum[k] != 0) {
+            temperature_ceiling_give(&controller->ceiling, model, k);
+        }
         before[k].ceiling = temperature_ceiling_declared(model, k);
         before[k].gives_w = spring_estimator_declared_w(model, k);
     }

@@ -135,17 +135,32 @@ uint16_t temperature_ceiling_rest_s(const temperature_ceiling_t *ceiling, uint8_
                : (uint16_t)(TEMPERATURE_CEILING_TURN_S * (float)turns);
 }
 
+void temperature_ceiling_give(temperature_ceiling_t *ceiling, const thermal_model_t *model,
+                              uint8_t k)
+{
+    open_spring(ceiling, model, k);
+    ceiling->rest_turns[k] = 0;
+    ceiling->delivered = true;
+    seal(ceiling, k);
+}
+
+/* Nobody calls it cold while it is given power, however little it has got by now. */
+static bool is_cold(const temperature_ceiling_t *ceiling, uint8_t k)
+{
+    return ceiling->rest_turns[k] != 0 && !temperature_ceiling_is_warm(ceiling, k);
+}
+
 /* Given, or until the springs are cold again. */
 static void account(temperature_ceiling_t *ceiling, const thermal_model_t *model, uint8_t k,
                     float power_w)
 {
     const int16_t ambient_c7 = thermal_model_ambient_c7(model);
     if (k == 0) {
-        bool warm = false;
-        for (uint8_t j = 0; j < model->springs && !warm; j++) {
-            warm = temperature_ceiling_is_warm(ceiling, j);
+        bool cold = true;
+        for (uint8_t j = 0; j < model->springs && cold; j++) {
+            cold = is_cold(ceiling, j);
         }
-        if (!warm) {
+        if (cold) {
             ceiling->delivered = false;
             for (uint8_t j = 0; j < model->springs; j++) {
                 open_spring(ceiling, model, j);
@@ -153,7 +168,7 @@ static void account(temperature_ceiling_t *ceiling, const thermal_model_t *model
                 seal(ceiling, j);
             }
         }
-        if (!warm || ambient_c7 > ceiling->ambient_c7) {
+        if (cold || ambient_c7 > ceiling->ambient_c7) {
             set_ambient(ceiling, ambient_c7);
         }
     }

@@ -61,9 +61,12 @@ typedef struct {
 } temperature_ceiling_declared_t;
 temperature_ceiling_declared_t temperature_ceiling_declared(const thermal_model_t *model,
                                                             uint8_t spring);
-/* Another model is declared; before: by the one until now. Until all springs are cold, of both the
- * smaller loss and heat capacity count: a spring that is hot by the numbers of before is not colder
- * by what is said of it. */
+/* It is given power that its next step will tell of. */
+void temperature_ceiling_give(temperature_ceiling_t *ceiling, const thermal_model_t *model,
+                              uint8_t spring);
+/* Another model is declared; before: by the one until now. From the first power on, until all
+ * springs are cold and none is given any, of both the smaller loss and heat capacity count: a
+ * spring that is hot by the numbers of before is not colder by what is said of it. */
 void temperature_ceiling_declare(temperature_ceiling_t *ceiling, const thermal_model_t *model,
                                  uint8_t spring, const temperature_ceiling_declared_t *before);
 

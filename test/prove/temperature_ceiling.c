@@ -44,6 +44,9 @@ void main(void)
             }
             break;
         }
+        case 2:
+            temperature_ceiling_give(&ceiling, &model, spring);
+            break;
         default:
             any_circuit(&circuit);
             temperature_ceiling_prepare(&drive, &model, &circuit);

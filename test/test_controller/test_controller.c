@@ -384,23 +384,24 @@ TEST(heat_that_was_given_is_kept_over_a_warm_reset)
 
 /* 2.35 A take it beyond 120 degC by what was declared as it became warm, and the belief is talked
  * away: the ceiling ends that at the trip, or at temperature_limit_c where another declaration
- * contradicts. */
+ * contradicts, be it from the first ticks of power on. */
 TEST(where_declarations_contradict_the_ceiling_trips_at_the_limit)
 {
     static const struct {
         float loss, capacity;
         int16_t air_c7;
+        uint16_t before; /* ticks */
         bool trips;
-    } row[] = {{1.0f, 1.0f, AMBIENT_C7, false},
-               {2.0f, 1.0f, AMBIENT_C7, true},
-               {1.0f, 4.0f, AMBIENT_C7, true},
-               {1.0f, 1.0f, -30 * 128, true}};
+    } row[] = {{1.0f, 1.0f, AMBIENT_C7, 3000, false}, {2.0f, 1.0f, AMBIENT_C7, 3000, true},
+               {1.0f, 4.0f, AMBIENT_C7, 3000, true},  {1.0f, 1.0f, -30 * 128, 3000, true},
+               {2.0f, 1.0f, AMBIENT_C7, 5, true},     {1.0f, 4.0f, AMBIENT_C7, 5, true},
+               {2.0f, 1.0f, AMBIENT_C7, 40, true},    {1.0f, 4.0f, AMBIENT_C7, 40, true}};
     for (unsigned n = 0; n < ROWS(row); n++) {
         setUp();
         settings.policy.open_current_ma = 2350;
         start();
         controller_set_target(&controller, 4, 1000);
-        run(50u * 60u);
+        run(row[n].before);
         settings.model.loss_uw_per_k = (uint16_t)(row[n].loss * settings.model.loss_uw_per_k);
         settings.model.heat_capacity_mj_per_k =
             (uint16_t)(row[n].capacity * settings.model.heat_capacity_mj_per_k);

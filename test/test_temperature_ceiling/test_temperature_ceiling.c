@@ -176,6 +176,38 @@ TEST(of_warm_springs_the_more_careful_numbers_count)
     }
 }
 
+/* From the first power on, however little it is by now: declared before or behind its first step,
+ * which is no 5 K. The springs that get none count with it. */
+TEST(what_is_declared_as_power_begins_is_declared_to_warm_springs)
+{
+    for (unsigned stepped = 0; stepped < 2; stepped++) {
+        float undeclared_c = 0.0f;
+        for (unsigned declared = 0; declared < 2; declared++) {
+            setUp();
+            if (stepped) {
+                run(0.6f, 600000u, TEMPERATURE_CEILING_TURN_S);
+                TEST_ASSERT_FALSE(temperature_ceiling_is_warm(&ceiling, 4));
+            } else {
+                temperature_ceiling_give(&ceiling, &model, 8);
+            }
+            if (declared) {
+                declare(3.4f, 10.0f);
+                TEST_ASSERT_UINT16_WITHIN(1, WHOLE / 10u, ceiling.capacity_share[0]);
+            }
+            run(0.6f, 600000u, 60.0f);
+            if (!declared) {
+                undeclared_c = temperature_ceiling_c(&ceiling, 8);
+            }
+        }
+        TEST_ASSERT_TRUE(temperature_ceiling_c(&ceiling, 8) > undeclared_c - 3.0f);
+    }
+    setUp(); /* and of cold ones, that got power before, it is what they are */
+    run(0.6f, 600000u, TEMPERATURE_CEILING_TURN_S);
+    run(0.0f, 0u, 2.0f * TEMPERATURE_CEILING_TURN_S);
+    declare(3.4f, 10.0f);
+    TEST_ASSERT_EQUAL_UINT16(WHOLE, ceiling.capacity_share[4]);
+}
+
 /* What is declared by so little more at a time that no single step shows: it goes by the least of
  * all, or up to a fiftieth below it. */
 TEST(many_small_declarations_escape_no_more_than_one_large_one)
