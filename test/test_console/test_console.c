@@ -317,6 +317,7 @@ TEST(every_refusal_says_what_would_be_right)
          ": fault_bad_samples is 1 to 50, for what docs/safety.md promises\r\n"},
         {5, "$stuck_on_a=0.501",
          ": stuck_on_a is 0.010 to 0.500 A, for what docs/safety.md promises\r\n"},
+        {5, "$dither_a=0.199", ": dither_a is 0.200 to 0.400 A\r\n"},
         {5, "$over_current_a=3.151",
          ": over_current_a is 0.100 to 3.150 A, for what docs/safety.md promises\r\n"},
         {4, "$supply_v=5V", ": supply_v is 1.000 to 16.000 V\r\n"},

@@ -915,7 +915,7 @@ TEST(targets_walk_until_two_rounds_after_the_last)
     apply(&parameters); /* the same policy */
     TEST_ASSERT_EQUAL_UINT8(0, policy.walks);
     policy.walks = 7;
-    TEST_ASSERT_TRUE(drive_policy_init(&policy, &parameters, &model, NULL));
+    restart();
     TEST_ASSERT_EQUAL_UINT8(0, policy.walks);
 }
 

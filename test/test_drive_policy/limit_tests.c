@@ -122,7 +122,7 @@ TEST(restart_leaves_nothing_driven_and_nothing_owed)
     decisions(ROUND_TICKS);
     policy.overload_quarters = 7;
     TEST_ASSERT_TRUE(policy.queue.count > 0);
-    TEST_ASSERT_TRUE(drive_policy_init(&policy, &parameters, &model, NULL));
+    restart();
     TEST_ASSERT_EQUAL_UINT8(0, policy.queue.count);
     TEST_ASSERT_EQUAL_UINT16(0, policy.overload_quarters);
     for (uint8_t k = 0; k < SPRINGS; k++) {

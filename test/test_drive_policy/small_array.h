@@ -19,6 +19,8 @@ extern bool allowed[SPRINGS];
 extern uint16_t target_ma[SPRINGS];
 extern uint16_t supply_limit_ma, maximum_current_ma;
 
+/* The policy anew, of the parameters. */
+void restart(void);
 /* So many springs, all of which are known to be at 20 degC. */
 void begin_cold(uint8_t rows, uint8_t columns);
 /* What the policy is told of a spring, whatever it is: for limits, which go by what is believed. */
