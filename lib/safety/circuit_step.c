@@ -10,7 +10,9 @@
 #define NOISE_MV    4.0f  /* a step of the voltage's register */
 #define CHANGE_PART 0.10f /* of its resistance, that a spring makes in three windows */
 /* As others switch, and what a contact makes of it where the wiring is not as declared. */
-#define SHARE_PART 0.04f
+#define SHARE_PART    0.04f
+#define AGAIN_PART    0.06f /* of long ago: others may have begun since, at one end of a cable */
+#define KNOWN_WINDOWS 3u
 /* What is compared with goes along with a spring, or a supply, that moves by a sixteenth, or a
  * thirty-second. */
 #define MOVED_OHM_SHIFT   4u
@@ -41,14 +43,17 @@ static bool is_off(uint16_t now, uint16_t was, float most_part, float most)
     return by > was >> MOVED_SHARE_SHIFT && (float)by > most_part * (float)was + most;
 }
 
-/* Of a lie both move: of the current, the share by so much of it as shunt and wiring are of the
- * loop, and the other way; of the voltage, by what the spring is of it. Either is a quarter of the
- * loop at least. */
+/* Of a lie that lets its spring get hotter both move: of the current, the share falls by so much of
+ * it as shunt and wiring are of the loop, and the resistance rises by all of it; of the voltage
+ * both fall, the share by what the spring is of it. Either is a quarter of the loop at least. */
 static bool is_like_a_lie(const circuit_shown_t *now, const circuit_shown_t *was)
 {
-    const bool other_way = (now->share_q12 > was->share_q12) != (now->ohm_q12 > was->ohm_q12);
-    const uint32_t share = fixed_point_mac_u16(0, apart(now->share_q12, was->share_q12),
-                                               other_way ? now->ohm_q12 : was->ohm_q12);
+    if (now->share_q12 >= was->share_q12) {
+        return false;
+    }
+    const uint32_t share =
+        fixed_point_mac_u16(0, apart(now->share_q12, was->share_q12),
+                            now->ohm_q12 > was->ohm_q12 ? now->ohm_q12 : was->ohm_q12);
     const uint32_t all = fixed_point_mac_u16(0, apart(now->ohm_q12, was->ohm_q12), was->share_q12);
     return share <= all && share >= all >> 2;
 }
@@ -63,10 +68,10 @@ static bool has_moved(const circuit_shown_t *now, const circuit_shown_t *was)
 
 /* A drop that is not the believed one takes as much of both voltages: one more than that makes the
  * share at fewer volts the lower one. */
-static bool shares_differ(const circuit_shown_t *now, const circuit_shown_t *was, float expected_mv,
-                          float fixed_ohm, const circuit_source_t *source)
+static bool shares_differ(const circuit_shown_t *now, const circuit_shown_t *was, float part,
+                          float expected_mv, float fixed_ohm, const circuit_source_t *source)
 {
-    const float noise_part = SHARE_PART + NOISE_MV / expected_mv;
+    const float noise_part = part + NOISE_MV / expected_mv;
     if (!is_off(now->share_q12, was->share_q12, noise_part, 0.0f)) {
         return false;
     }
@@ -79,6 +84,31 @@ static bool shares_differ(const circuit_shown_t *now, const circuit_shown_t *was
                   Q12 * unsure_mv * fabsf(change) / expected_mv);
 }
 
+/* What it shows no more at this current is kept, if it did for some windows. */
+static void leave(circuit_step_t *step)
+{
+    if (step->windows >= KNOWN_WINDOWS) {
+        step->was[1] = step->was[0];
+    }
+    step->was[0].share_q12 = 0;
+    step->windows = step->odd = step->again = step->moved = 0;
+}
+
+/* To what it showed at this current, the last or the one before. */
+static void look_back(circuit_step_t *step, const circuit_shown_t *now)
+{
+    if (step->was[0].share_q12 != 0 && is_like(now->current_16ma, step->was[0].current_16ma)) {
+        return;
+    }
+    const circuit_shown_t before = step->was[1];
+    leave(step);
+    if (is_like(now->current_16ma, before.current_16ma)) { /* none is like 0 */
+        step->was[0] = before;
+        step->windows = KNOWN_WINDOWS;
+        step->again = 1;
+    }
+}
+
 bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
                         const circuit_source_t *source, const current_control_parameters_t *circuit)
 {
@@ -86,32 +116,35 @@ bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
     const float spring_mv = window->found_mv - fixed_ohm * window->current_ma;
     if (!circuit_window_compares(window) || spring_mv < NOISE_MV ||
         window->current_ma < CURRENT_MA) {
-        *step = (circuit_step_t){0};
+        leave(step);
         return false;
+    }
+    if (!window->steady) { /* of two currents */
+        step->again = 1;
+        return step->odd >= CIRCUIT_STEP_WINDOWS;
     }
     const circuit_shown_t now = {to_q12(window->found_mv / window->expected_mv),
                                  to_q12(spring_mv / window->current_ma),
                                  (uint8_t)fminf(window->current_ma / CURRENT_MA, 255.0f)};
-    const float change_part = CHANGE_PART + NOISE_MV / spring_mv;
-    bool odd = false, like = true;
-    for (uint8_t n = 0; n < CIRCUIT_STEP_BACK; n++) {
-        const circuit_shown_t *const was = &step->was[n];
-        if (was->share_q12 != 0) {
-            like = like && is_like(now.current_16ma, was->current_16ma);
-            odd = odd || (is_off(now.ohm_q12, was->ohm_q12, change_part, 0.0f) &&
-                          shares_differ(&now, was, window->expected_mv, fixed_ohm, source));
-        }
+    look_back(step, &now);
+    circuit_shown_t *const was = &step->was[0];
+    if (was->share_q12 == 0) {
+        *was = now;
     }
-    if (!like) {
-        *step = (circuit_step_t){.was = {now}};
-    } else if (odd) {
-        step->odd = step->odd < CIRCUIT_STEP_WINDOWS ? (uint8_t)(step->odd + 1u) : step->odd;
+    const float change_part = CHANGE_PART + NOISE_MV / spring_mv;
+    const float share_part = step->again ? AGAIN_PART : SHARE_PART;
+    if (is_off(now.ohm_q12, was->ohm_q12, change_part, 0.0f) &&
+        (!step->again || is_like_a_lie(&now, was)) &&
+        shares_differ(&now, was, share_part, window->expected_mv, fixed_ohm, source)) {
+        step->odd = step->odd < CIRCUIT_STEP_WINDOWS ? (step->odd + 1u) & 3u : step->odd;
     } else {
-        circuit_shown_t *const first = &step->was[CIRCUIT_STEP_BACK - 1u];
-        if (first->share_q12 == 0 || has_moved(&now, first)) {
-            *first = step->was[0];
+        const bool moved = has_moved(&now, was);
+        if (moved && step->moved) { /* the first may be the one in which a lie begins */
+            *was = now;
+            step->again = 0;
         }
-        step->was[0] = now;
+        step->moved = moved && !step->moved;
+        step->windows = step->windows < KNOWN_WINDOWS ? (step->windows + 1u) & 3u : step->windows;
         step->odd = 0;
     }
     return step->odd >= CIRCUIT_STEP_WINDOWS;
@@ -123,7 +156,7 @@ void circuit_step_renew(circuit_step_t steps[], uint8_t springs, const circuit_s
     const bool same_drop = fabsf(now->drop_mv - before->drop_mv) < SAME_DROP_MV;
     const float part = same_drop ? before->step_mv / now->step_mv : 0.0f;
     for (uint8_t k = 0; k < springs; k++) {
-        for (uint8_t n = 0; n < CIRCUIT_STEP_BACK; n++) {
+        for (uint8_t n = 0; n < 2; n++) {
             uint16_t *const share_q12 = &steps[k].was[n].share_q12;
             *share_q12 = to_q12(part * (1.0f / Q12) * (float)*share_q12);
         }

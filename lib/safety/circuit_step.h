@@ -17,7 +17,6 @@
 extern "C" {
 #endif
 
-#define CIRCUIT_STEP_BACK    2u
 #define CIRCUIT_STEP_WINDOWS 2u /* on end */
 
 typedef struct {
@@ -28,24 +27,30 @@ typedef struct {
 
 /* Of one spring; all zero: nothing is known. */
 typedef struct {
-    /* The last window; and the first since which resistance and share have moved by little, or as a
-     * lie that grows moves both: the last but one at the latest, as the one in which a lie begins
-     * shows a part of it. */
-    circuit_shown_t was[CIRCUIT_STEP_BACK];
-    uint8_t odd; /* windows on end, which were not kept */
+    /* What it showed at its present current, and at the one before: the first window since which
+     * resistance and share have moved by little, or as a lie that grows moves both. */
+    circuit_shown_t was[2];
+    uint8_t odd : 2;     /* windows on end, which were not kept */
+    uint8_t windows : 2; /* at this current, saturating */
+    uint8_t again : 1;   /* it has come back to this current */
+    uint8_t moved : 1;   /* the last window was one that something else has changed */
 } circuit_step_t;
 
 /* Takes a spring's window. True if and only if for CIRCUIT_STEP_WINDOWS on end, at a current within
  * a half of what it was, resistance is off by more than 10 % AND the share of the expected voltage
- * that is found behind the switch by more than 4 % (and what 4 mV make of either) from what one of
- * the CIRCUIT_STEP_BACK windows that are kept showed. Supply and wiring change the share and not
- * the resistance; a contact changes the resistance and hardly the share; a spring changes its
- * resistance by a tenth in 1.8 s at the most (3 A, the least latent heat in print), and never the
- * share. A sensor that begins to show another part of its current changes the share by about half
- * of the lie. The older of the two stays as long as resistance and share keep within 6 and 3 %, or
- * move together as a lie moves them, by a fourth part to all of each other: so a lie that grows is
- * found, however slowly it does. A window that tells nothing, of less than 0.1 V, of less than 16
- * mA or another current ends what is known. */
+ * that is found behind the switch by more than 4 % (and what 4 mV make of either) from what the
+ * window that is kept showed. Supply and wiring change the share and not the resistance; a contact
+ * changes the resistance and hardly the share; a spring changes its resistance by a tenth in 1.8 s
+ * at the most (3 A, the least latent heat in print), and never the share. A sensor that begins to
+ * show another part of its current changes the share by about half of the lie. What is kept goes
+ * along in the second window on end that is off by more than 6 or 3 %; but it stays as long as both
+ * move as a lie moves them that lets its spring get hotter, the share down, by a fourth part to all
+ * of the resistance: so such a lie is found, however slowly it grows. One that grows the other way
+ * makes its spring colder, and is not told from a supply that rises as it transforms.
+ * At another current, or where a window tells nothing, is of less than 0.1 V or of less than 16 mA,
+ * another window is kept, and this one beside it, if it was for 3 of them: a lie that has the
+ * spring heated again is held against the hold before. There both must be off as such a lie moves
+ * them, the share by 6 %: others may have begun since. A window of two currents is left out. */
 bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
                         const circuit_source_t *source,
                         const current_control_parameters_t *circuit);
@@ -58,8 +63,7 @@ void circuit_step_renew(circuit_step_t steps[], uint8_t springs, const circuit_s
 /* The share that the older of the windows that are kept showed; 0: none is known. */
 static inline uint16_t circuit_step_before_q12(const circuit_step_t *step)
 {
-    const circuit_shown_t *const oldest = &step->was[CIRCUIT_STEP_BACK - 1u];
-    return oldest->share_q12 != 0 ? oldest->share_q12 : step->was[0].share_q12;
+    return step->was[0].share_q12;
 }
 
 #ifdef __cplusplus

@@ -21,6 +21,7 @@ void main(void)
             .expected_mv = Frama_C_float_interval(0.0f, 17000.0f),
             .current_ma = Frama_C_float_interval(0.0f, 4095.0f),
             .tells = any_bool(),
+            .steady = any_bool(),
         };
         (void)circuit_step_judge(&step, &window, &source, &settings);
         if (any_bool()) {
