@@ -215,6 +215,7 @@ def test_what_bends_as_it_likes_gives_way_to_a_name_that_foretells_better(
     monkeypatch.setattr(diagnosis, "unexplained", lambda *_: left)
     monkeypatch.setattr(diagnosis.unseen, "Unseen", lambda *_: None)
     monkeypatch.setattr(diagnosis, "_off", lambda case, *_: case.off_k)
+    monkeypatch.setattr(diagnosis, "_rested", lambda *_: None)
 
     def silent(text: str) -> None:
         pass

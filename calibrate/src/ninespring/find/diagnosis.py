@@ -26,7 +26,7 @@ from ..io.logs import condense
 from ..io.logs.run import Run
 from ..model import effects
 from ..model.models import Array, Model
-from ..model.spec import RUNS_OWN, Spec
+from ..model.spec import RUN_AMBIENT, RUNS_OWN, Spec
 from . import (
     contacts,
     doubt,
@@ -34,6 +34,7 @@ from . import (
     lasting,
     plausibility,
     resistance,
+    rested,
     runs_apart,
     search,
     unknown_heat,
@@ -297,6 +298,10 @@ class _Case:
         return [e for e in self.final.spec.effects if e not in self.base.spec.effects]
 
 
+_Account = tuple[_Case, search.Search, unseen.Unseen]
+"""What was found, the search that judged it, and what it foretells."""
+
+
 def _diagnose(
     array: Array, runs: Sequence[Run], model: Model | None, frozen: bool, progress: Callable[[str], None]
 ) -> Diagnosis:
@@ -370,21 +375,28 @@ def _diagnose(
 
 def _foretelling(
     array: Array, runs: Sequence[Run], model: Model | None, frozen: bool, progress: Callable[[str], None]
-) -> tuple[_Case, search.Search, unseen.Unseen]:
+) -> _Account:
     """Search by what has a name and is the same in all runs; where that leaves something, by all there is.
 
     What is of one day bends as it likes: it is the better account only where a run that was left out is not foretold better
     without it. (A cause without a name is in no model: what it leaves in such a run speaks for no stand-in.)
     """
 
-    def account(alike: bool, fits: Mapping[Any, Fit] | None = None) -> tuple[_Case, search.Search, unseen.Unseen]:
-        problem = prepare(model.array if model else array, runs, dict(model.parameters) if model else {})
+    def prepared() -> Problem:
+        return prepare(model.array if model else array, runs, dict(model.parameters) if model else {})
+
+    def account(alike: bool, fits: Mapping[Any, Fit] | None = None) -> _Account:
+        problem = prepared()
         case = _searched(problem, model, frozen, progress, alike, fits)
         judged_by = unseen.Unseen(problem, case.search, case.declared)
         return case, _judged(case, judged_by), judged_by
 
-    if len(runs) == 1 or frozen:
+    if frozen:
         return account(False)
+    if len(runs) == 1:
+        plain = account(False)
+        beside = _rested(plain[0], prepared)
+        return beside if beside is not None and _rather(beside, plain) else plain
     same = account(True)
     if not unexplained(same[0].problem, same[0].final):
         return same
@@ -393,6 +405,34 @@ def _foretelling(
     # what bent may have been dropped since, and nothing be left in its place
     instead = set(same[0].adopted) - set(found[0].adopted) if not found[0].hidden else ()
     return same if instead and _off(*same) * unseen.WORSE < _off(*found) else found
+
+
+def _rested(plain: _Case, prepared: Callable[[], Problem]) -> _Account | None:
+    """Return another account of a run alone whose springs do not rest where its room was logged: from there; None where it has that
+    room and an alloy, nothing is left, or that room is not needed."""
+    anywhere = {c.effect for c in plain.search.candidates if c.alternatives}
+    if plain.hidden or rested.off_k(plain.search) is None or not unexplained(plain.problem, plain.final):
+        return None
+    if RUN_AMBIENT in plain.adopted and anywhere & set(plain.adopted):
+        return None
+    problem = prepared()
+    first = search.Search(problem, plain.search.candidates, first_fit(problem, plain.declared.spec), plain.progress)
+    judged_by = unseen.Unseen(problem, first, first.base)
+    searched = rested.search_rested(first, judged_by)
+    if searched is None:
+        return None
+    found, final, without = searched
+    final = _finish(problem, final)
+    case = _Case(problem, plain.progress, found, first.base, found.base, final, without, [], plain.swapped, [], {})
+    case.witnesses = {effect: witness(problem, final, effect, other, False) for effect, other in without.items()}
+    return case, found, judged_by
+
+
+def _rather(one: _Account, other: _Account) -> bool:
+    """Return whether an account foretells the rest of a run better than another, or is likelier and foretells it as well."""
+    off, beside = _off(*one), _off(*other)
+    likelier = log_evidence(one[0].problem, one[0].final, other[0].final) > 0.0
+    return off * unseen.WORSE < beside or (likelier and off <= beside * unseen.WORSE)
 
 
 def _off(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> float:
@@ -649,6 +689,11 @@ def _warned(
     if left_over and problem.budget.short:
         warnings.append(
             f"the search ended at its bound of {problem.budget.enough} simulations: there may be more to find"
+        )
+    if (off_k := rested.off_k(case.search)) is not None and RUN_AMBIENT not in final.spec.effects:
+        warnings.append(
+            f"before anything was driven the springs read {abs(off_k):.1f} K {'more' if off_k > 0 else 'less'} than ambient_c: "
+            "what they lose heat to is not where it was logged, or a thermometer is off; how much of that lasts is not told here"
         )
     if left_over and not case.adopted:
         warnings += [

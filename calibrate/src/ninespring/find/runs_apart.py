@@ -12,7 +12,7 @@ from ..infer.result import parameters_of
 from ..io import results
 from ..model import effects
 from ..model.spec import RUN_DRIVE, RUNS_OWN
-from .certainty import CERTAIN, Witness
+from .certainty import CERTAIN, NAMED, Witness
 
 ROUNDS = 3
 """Of fitting the runs' numbers and their spread in turn (expectation maximisation): more moves neither."""
@@ -71,11 +71,12 @@ def entry(problem: Problem, fit: Fit, effect: str, nats: float, sure: Witness) -
     if effect == RUN_DRIVE and fit.covariance is not None:
         for k, variance in zip(at, np.diag(covariance), strict=True):
             parameters[fit.spec.free[k].key].stderr = float(fit.values[k] * np.sqrt(max(0.0, variance)))
+    probability = max(NAMED, sure.probability())  # where less, what was not seen tells of it
     return results.RunsDiffer(
         name=effect,
         evidence=nats,
-        probability=sure.probability(),
-        certainty="certain" if sure.probability() >= CERTAIN else "probable",
+        probability=probability,
+        certainty="certain" if probability >= CERTAIN else "probable",
         witness=sure,
         spread=results.Spread(value=spread_of(fit, effect), unit="1" if effect == RUN_DRIVE else "K"),
         parameters=parameters,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 from ..spec import Free
 from .effect import Scene
 
@@ -18,6 +20,8 @@ LEAST_GAP_K = -30.0
 """From M_s to A_s: bands overlap in 7 % of the samples. A loop must be closed: the plant refuses one that is not."""
 USUAL_K = 20.0
 """Width of a band, by those samples."""
+CLOSED_K = 4.0
+"""Between the middles of the bands of a narrow loop: an R-phase's, or of a wire that is loaded and trained."""
 STEP_K = 5.0
 """Places of the transformation that are tried: half its usual width apart."""
 
@@ -58,3 +62,12 @@ def places(scene: Scene) -> list[dict[str, float]]:
     bands = [STILL, wider | {HYSTERESIS: -0.5 * sum(wider.values())}] if any(wider.values()) else [STILL]
     shifts = [STEP_K * k for k in range(-most + 1, most)]
     return [{SHIFT: s} | one for one in bands for s in shifts if get("austenite_start_c") + s < scene.hottest_c]
+
+
+def closed(place: Mapping[str, float], get: Callable[[str], float]) -> dict[str, float]:
+    """Return a place with its bands as wide as they mostly are, about nearly the same middle: a narrow loop."""
+    heating = get("austenite_finish_c") - get("austenite_start_c")
+    cooling = get("martensite_start_c") - get("martensite_finish_c")
+    apart = get("austenite_start_c") - get("martensite_start_c") + 0.5 * (heating + cooling)
+    wider = {HEATING: USUAL_K - heating, COOLING: USUAL_K - cooling}
+    return dict(place) | wider | {HYSTERESIS: CLOSED_K - apart - 0.5 * sum(wider.values())}
