@@ -177,8 +177,6 @@ void spring_jump(spring_belief_t *belief, float by);
  * jump. */
 void spring_misread(spring_estimator_t *estimator, const thermal_model_t *model, uint8_t spring,
                     float by, float noise);
-/* Told by its own resistances, both of which were learnt, 0..1. */
-float spring_phase_by_resistance(const spring_belief_t *belief);
 /* By so much, of its austenite's, ohm is beyond what it read when it had transformed last (below 0:
  * less). 0 where as much as being hotter or colder makes of that explains it. */
 float spring_beyond_austenite(const spring_belief_t *belief, const thermal_model_t *model,

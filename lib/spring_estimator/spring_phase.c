@@ -29,7 +29,8 @@ static float martensite_ohm_now(const spring_belief_t *b, const thermal_model_t 
            (1.0f + l->martensite_rise_per_k * (spring_now_c(model, k) - LEARNT_AT_C));
 }
 
-float spring_phase_by_resistance(const spring_belief_t *b)
+/* Told by its own resistances, both of which were learnt, 0..1. */
+static float phase_by_resistance(const spring_belief_t *b)
 {
     const spring_learnt_t *l = &b->learnt;
     return spring_clamp(1.0f - (1.0f - b->phase_ohm / l->austenite_ohm) / l->change, 0.0f, 1.0f);
@@ -43,7 +44,7 @@ float spring_estimator_phase(const spring_estimator_t *e, const thermal_model_t 
     case BY_LOSS:
         return spring_clamp(1.0f - b->lost, 0.0f, 1.0f);
     case BY_RESISTANCE:
-        return spring_phase_by_resistance(b);
+        return phase_by_resistance(b);
     case BY_MARTENSITE:
         return spring_clamp((1.0f - martensite_ohm_now(b, model, k) / b->phase_ohm) / l->change,
                             0.0f, 1.0f);
