@@ -16,7 +16,7 @@ from ninespring.infer.likelihood import Colour
 from ninespring.io.logs import log_text, read_log
 from ninespring.io.logs.run import Run
 from ninespring.model import native
-from ninespring.model.effects import alloy
+from ninespring.model.effects import Candidate, alloy
 from ninespring.model.models import Array, Model
 from ninespring.model.spec import RUN_AMBIENT, Free, Spec
 
@@ -147,3 +147,9 @@ def test_a_name_is_needed_by_errors_that_are_the_same_without_it_and_by_the_unse
     off = {id(fit): 1.0, id(other): worse}
     judged_by: Any = SimpleNamespace(own=lambda one: off[id(one)], tells=lambda *_: tells)
     assert rested._needed(found, judged_by, fit, other) is needed
+
+
+def test_a_blur_that_begins_at_several_widths_is_no_alloy() -> None:
+    numbers = [(Free(key, 0.0, -1.0, 1.0, "K", effect="one"),) for key in ("blur_fraction", alloy.SHIFT)]
+    blur, latent = candidates = [Candidate("", free, ({},), alternatives=True) for free in numbers]
+    assert rested.alloys(candidates) == [latent] and blur not in rested.alloys(candidates)

@@ -410,10 +410,10 @@ def _foretelling(
 def _rested(plain: _Case, prepared: Callable[[], Problem]) -> _Account | None:
     """Return another account of a run alone whose springs do not rest where its room was logged: from there; None where it has that
     room and an alloy, nothing is left, or that room is not needed."""
-    anywhere = {c.effect for c in plain.search.candidates if c.alternatives}
+    alloys = {c.effect for c in rested.alloys(plain.search.candidates)}
     if plain.hidden or rested.off_k(plain.search) is None or not unexplained(plain.problem, plain.final):
         return None
-    if RUN_AMBIENT in plain.adopted and anywhere & set(plain.adopted):
+    if RUN_AMBIENT in plain.adopted and alloys & set(plain.adopted):
         return None
     problem = prepared()
     first = search.Search(problem, plain.search.candidates, first_fit(problem, plain.declared.spec), plain.progress)

@@ -7,7 +7,7 @@ them, and what foretells the rest of the run is kept.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from ..infer.fit import Fit
@@ -26,6 +26,11 @@ def off_k(found: Search) -> float | None:
     return rests[0] if rests else None
 
 
+def alloys(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Return those that tell where a transformation is."""
+    return [c for c in candidates if any(free.key == alloy.SHIFT for free in c.free)]
+
+
 def _narrow(one: Candidate, get: Callable[[str], float]) -> Candidate:
     """Return a candidate whose alloy may be in several places with a narrow loop at each of them."""
     loops = {place[alloy.SHIFT]: alloy.closed(place, get) for place in one.probes}
@@ -37,7 +42,7 @@ def _begun(first: Search, base: Fit) -> list[Fit]:
     the search from the logged room has begun with others."""
     problem = first.problem
     company = [c for c in first.candidates if c.effect in (RUN_AMBIENT, LAG)]
-    loops = {c.effect: _narrow(c, problem.base_value) for c in first.candidates if c.alternatives}
+    loops = {c.effect: _narrow(c, problem.base_value) for c in alloys(first.candidates)}
     found = Search(problem, [*company, *loops.values()], base, first.progress)
     beside = found.refit(base, company, [1.0] * len(company))
     screen = found.screen(beside)
