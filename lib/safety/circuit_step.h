@@ -60,7 +60,7 @@ bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
 void circuit_step_renew(circuit_step_t steps[], uint8_t springs, const circuit_source_t *before,
                         const circuit_source_t *now);
 
-/* The share that the older of the windows that are kept showed; 0: none is known. */
+/* The share that it is held against at its present current; 0: none is known. */
 static inline uint16_t circuit_step_before_q12(const circuit_step_t *step)
 {
     return step->was[0].share_q12;

@@ -64,6 +64,7 @@ def search_rested(first: Search, judged_by: Unseen) -> tuple[Search, Fit, dict[s
     base = problem.fit(first.base.spec, first.base.as_dict(), errors=True)
     found = Search(problem, first.candidates, base, first.progress)
     fits = [problem.fit(rich.spec, rich.as_dict(), tolerance=1e-3), *_begun(first, base)]
+    # each by a judge of its own: one keeps what it has of a spec, and most of these fits have the same
     fit = min(fits, key=lambda one: Unseen(problem, first, first.base).own(one))
     found.fits[found.key(fit.spec)] = fit
     while RUN_AMBIENT in fit.spec.effects:
