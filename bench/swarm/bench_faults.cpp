@@ -363,6 +363,16 @@ std::vector<injected> catalogue()
         {"losses x 3.4 declared", {say(0, "$loss_w_per_k=0.0197")}},
         {"heat capacity x 10 declared", {say(0, "$heat_capacity_j_per_k=3")}},
         {"heat capacity of one x 3 declared", {say(0, "$heat_capacity_scale_1=3")}},
+        {"a plate that takes ten times the losses declared",
+         {say(0, "$plate_heat_capacity_j_per_k=2000"), say(0.2, "$plate_loss_w_per_k=0.065"),
+          say(0.4, "$plate_coupling_w_per_k=0.06")}},
+        {"neighbours x 27 declared", {say(0, "$orthogonal_w_per_k=0.016")}},
+        {"latent heat x 2.75 declared", {say(0, "$latent_heat_j=23.8")}},
+        {"cold declared after the warmest air",
+         {say(0, "off all"), say(0.1, "ambient 50"), say(1.5, "ambient 20"),
+          say(1.7, "model cold")}},
+        {"cold declared after another size",
+         {say(0, "off all"), say(0.1, "$rows=1"), say(1.5, "$rows=3"), say(1.7, "model cold")}},
         {"air of -40 degC declared", {say(0, "ambient -40")}},
     };
 }

@@ -187,10 +187,10 @@ static float capacity_j_per_k(const thermal_model_t *model, uint8_t k)
            (float)((uint32_t)p->heat_capacity_scale_permille[k] * p->heat_capacity_mj_per_k);
 }
 
-/* What joins it with neighbours and plate. */
+/* What joins it with its neighbours. */
 static uint32_t couplings_uw_per_k(const thermal_model_t *model, uint8_t k)
 {
-    uint32_t sum_uw_per_k = model->parameters.plate_coupling_uw_per_k;
+    uint32_t sum_uw_per_k = 0;
     for (uint8_t j = 0; j < model->springs; j++) {
         sum_uw_per_k += thermal_model_coupling_uw_per_k(model, k, j);
     }
@@ -202,10 +202,19 @@ temperature_ceiling_declared_t temperature_ceiling_declared(const thermal_model_
     /* the difference: what flows at one temperature is its neighbours', too */
     const int32_t more_uw = thermal_model_power_to_hold_uw(model, k, HOT_C * 128) -
                             thermal_model_power_to_hold_uw(model, k, COOL_C * 128);
-    const int32_t loss_uw = more_uw - (HOT_C - COOL_C) * (int32_t)couplings_uw_per_k(model, k);
-    return (temperature_ceiling_declared_t){.loss_w_per_k =
-                                                1e-6f / (float)(HOT_C - COOL_C) * (float)loss_uw,
-                                            .capacity_j_per_k = capacity_j_per_k(model, k)};
+    const thermal_model_parameters_t *const p = &model->parameters;
+    const float plate_w_per_k = 1e-6f * (float)p->plate_coupling_uw_per_k;
+    const float neighbours_w_per_k = 1e-6f * (float)couplings_uw_per_k(model, k);
+    const float loss_w_per_k = 1e-6f / (float)(HOT_C - COOL_C) * (float)more_uw - plate_w_per_k -
+                               neighbours_w_per_k;
+    const float capacity = capacity_j_per_k(model, k);
+    return (temperature_ceiling_declared_t){
+        .loss_w_per_k = loss_w_per_k,
+        .with_plate_w_per_k = loss_w_per_k + plate_w_per_k,
+        .with_neighbours_w_per_k = loss_w_per_k + neighbours_w_per_k,
+        .capacity_j_per_k = capacity,
+        .heat_j = capacity *
+                  (TEMPERATURE_CEILING_HEATED_K + (float)model->latent_full_c8 * (1.0f / 256.0f))};
 }
 
 static float of_share(float value, uint16_t share)
@@ -213,12 +222,26 @@ static float of_share(float value, uint16_t share)
     return 1.0f / (float)WHOLE_SHARE * (float)share * value;
 }
 
+/* Of several changes that one share has to do for, the larger one: a single number that is declared
+ * moves all of them the same way, and taken back it takes back as much. */
+static float larger(float one, float other)
+{
+    const float one_times = one < 1.0f ? 1.0f / one : one;
+    return one_times > (other < 1.0f ? 1.0f / other : other) ? one : other;
+}
+
+/* What was declared before is so many times what is now. */
+static float change(float before, float now)
+{
+    return clamp(now > 0.0f ? before / now : (float)WHOLE_SHARE, 1.0f / (float)WHOLE_SHARE,
+                 (float)WHOLE_SHARE);
+}
+
 /* As much as before, or all of what is declared now; rounded to the careful side: declarations that
  * raise it by less than a share's step would raise what it goes by. */
-static uint16_t share_of(uint16_t share, float before, float now)
+static uint16_t share_of(uint16_t share, float kept)
 {
-    const float kept = now > 0.0f ? (float)share * (before / now) : (float)WHOLE_SHARE;
-    return (uint16_t)clamp(kept, 1.0f, (float)WHOLE_SHARE);
+    return (uint16_t)clamp((float)share * kept, 1.0f, (float)WHOLE_SHARE);
 }
 
 void temperature_ceiling_declare(temperature_ceiling_t *ceiling, const thermal_model_t *model,
@@ -227,10 +250,16 @@ void temperature_ceiling_declare(temperature_ceiling_t *ceiling, const thermal_m
     open_spring(ceiling, model, k);
     if (ceiling->delivered) {
         const temperature_ceiling_declared_t now = temperature_ceiling_declared(model, k);
+        const float loss = change(before->loss_w_per_k, now.loss_w_per_k);
+        const float plate = change(before->with_plate_w_per_k, now.with_plate_w_per_k);
+        const float neighbours =
+            change(before->with_neighbours_w_per_k, now.with_neighbours_w_per_k);
+        const float capacity = change(before->capacity_j_per_k, now.capacity_j_per_k);
+        const float heat = change(before->heat_j, now.heat_j);
         ceiling->loss_share[k] =
-            share_of(ceiling->loss_share[k], before->loss_w_per_k, now.loss_w_per_k);
+            share_of(ceiling->loss_share[k], larger(larger(loss, plate), neighbours));
         ceiling->capacity_share[k] =
-            share_of(ceiling->capacity_share[k], before->capacity_j_per_k, now.capacity_j_per_k);
+            share_of(ceiling->capacity_share[k], larger(capacity, heat));
     }
     seal(ceiling, k);
 }
@@ -317,12 +346,12 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
         }
     }
     const float leaves_w = given_off_w(ceiling, model, k) - 1e-6f * (float)(colder / 128);
-    const float into_w =
-        power_w - (leaves_w > 0.0f ? of_share(leaves_w, ceiling->loss_share[k]) : leaves_w);
+    const uint16_t share = leaves_w > 0.0f ? ceiling->loss_share[k] : WHOLE_SHARE;
     /* stable whatever the heat capacity: the flow's own change is taken at the end of the step */
-    const float gain_k = into_w * TEMPERATURE_CEILING_TURN_S /
-                         (of_share(capacity_j_per_k(model, k), ceiling->capacity_share[k]) +
-                          1e-6f * TEMPERATURE_CEILING_TURN_S * (float)stiffness_uw_per_k);
+    const float gain_k =
+        (power_w - of_share(leaves_w, share)) * TEMPERATURE_CEILING_TURN_S /
+        (of_share(capacity_j_per_k(model, k), ceiling->capacity_share[k]) +
+         1e-6f * TEMPERATURE_CEILING_TURN_S * of_share((float)stiffness_uw_per_k, share));
     add_heat(ceiling, model, k, gain_k);
     seal(ceiling, k);
 }

@@ -17,6 +17,7 @@ extern "C" {
 
 #define TEMPERATURE_CEILING_TURN_S      0.6f /* between two steps of a spring */
 #define TEMPERATURE_CEILING_WARM_K      5.0f /* above ambient, that who says 'cold' may be off by */
+#define TEMPERATURE_CEILING_HEATED_K    40.0f /* at least, from a room to its transformation's end */
 #define TEMPERATURE_CEILING_NEVER       UINT16_MAX
 #define TEMPERATURE_CEILING_WHOLE_SHARE UINT16_MAX
 
@@ -57,7 +58,10 @@ uint16_t temperature_ceiling_rest_s(const temperature_ceiling_t *ceiling, uint8_
 /* What a model declares of a spring, wherever it and its neighbours are. */
 typedef struct {
     float loss_w_per_k; /* to the air: what flows to neighbours and plate stays in the array */
+    float with_plate_w_per_k;
+    float with_neighbours_w_per_k; /* the loss and what joins it with them */
     float capacity_j_per_k;
+    float heat_j; /* that warms it by TEMPERATURE_CEILING_HEATED_K and transforms it */
 } temperature_ceiling_declared_t;
 temperature_ceiling_declared_t temperature_ceiling_declared(const thermal_model_t *model,
                                                             uint8_t spring);
@@ -66,7 +70,9 @@ void temperature_ceiling_give(temperature_ceiling_t *ceiling, const thermal_mode
                               uint8_t spring);
 /* Another model is declared; before: by the one until now. From the first power on, until all
  * springs are cold and none is given any, of both the smaller loss and heat capacity count: a
- * spring that is hot by the numbers of before is not colder by what is said of it. */
+ * spring that is hot by the numbers of before is not colder by what is said of it. A plate or
+ * neighbours that are said to take more take no more than before, nor does a latent heat; as if the
+ * loss or the heat capacity had been declared so many times as large. */
 void temperature_ceiling_declare(temperature_ceiling_t *ceiling, const thermal_model_t *model,
                                  uint8_t spring, const temperature_ceiling_declared_t *before);
 

@@ -79,7 +79,7 @@ TEST(it_follows_the_declared_network)
 }
 
 /* Other numbers are declared, by settings that arrive now. */
-static void declare_scaled(float loss, float capacity, float scale)
+static void declare_model(const thermal_model_parameters_t *now)
 {
     temperature_ceiling_declared_t before[THERMAL_MODEL_MAX_SPRINGS];
     thermal_model_state_t state;
@@ -87,17 +87,22 @@ static void declare_scaled(float loss, float capacity, float scale)
         before[k] = temperature_ceiling_declared(&model, k);
     }
     thermal_model_get_state(&model, &state);
+    TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, now, NULL));
+    (void)thermal_model_set_state(&model, &state);
+    for (uint8_t k = 0; k < model.springs; k++) {
+        temperature_ceiling_declare(&ceiling, &model, k, &before[k]);
+    }
+}
+
+static void declare_scaled(float loss, float capacity, float scale)
+{
     thermal_model_parameters_t now = parameters;
     now.loss_uw_per_k = (uint16_t)(loss * (float)parameters.loss_uw_per_k);
     now.heat_capacity_mj_per_k = (uint16_t)(capacity * (float)parameters.heat_capacity_mj_per_k);
     for (uint8_t k = 0; k < model.springs; k++) {
         now.heat_capacity_scale_permille[k] = (uint16_t)(1000.0f * scale);
     }
-    TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &now, NULL));
-    (void)thermal_model_set_state(&model, &state);
-    for (uint8_t k = 0; k < model.springs; k++) {
-        temperature_ceiling_declare(&ceiling, &model, k, &before[k]);
-    }
+    declare_model(&now);
 }
 
 static void declare(float loss, float capacity)
@@ -173,6 +178,46 @@ TEST(of_warm_springs_the_more_careful_numbers_count)
                                          (row[n].capacity > row[n].twin_capacity ? 29.0f : 3.0f));
             }
         }
+    }
+}
+
+/* A plate, neighbours or a latent heat that are said to take more, at any moment of a heating:
+ * beside a twin to which nothing was said no spring is colder, driven alone or beside the others;
+ * taken back, all is as before. */
+TEST(what_else_is_said_to_take_heat_takes_no_more_of_a_warm_spring)
+{
+    for (unsigned n = 0; n < 16u; n++) {
+        thermal_model_parameters_t now = parameters;
+        now.plate_coupling_uw_per_k = n % 4u == 0 ? 50000 : 0;
+        now.plate_heat_capacity_mj_per_k = 2000000;
+        now.plate_loss_uw_per_k = 65535;
+        now.orthogonal_uw_per_k = n % 4u == 1 ? 12000 : parameters.orthogonal_uw_per_k;
+        now.diagonal_uw_per_k = n % 4u == 2 ? 12000 : parameters.diagonal_uw_per_k;
+        now.latent_heat_mj = n % 4u == 3 ? 23800 : parameters.latent_heat_mj;
+        const bool alone = n / 4u % 2u != 0;
+        const int when = n < 8u ? 1 : 20;
+        float twin_c[60];
+        for (int twin = 1; twin >= 0; twin--) {
+            setUp();
+            for (int m = 0; m < 60; m++) {
+                for (int turn = 0; turn < 10; turn++) {
+                    for (uint8_t k = 0; k < 9; k++) {
+                        temperature_ceiling_step(&ceiling, &model, k,
+                                                 k == 4 || !alone ? 0.6f : 0.0f);
+                    }
+                }
+                if (m == when && !twin) {
+                    declare_model(&now);
+                }
+                if (twin) {
+                    twin_c[m] = temperature_ceiling_c(&ceiling, 4);
+                }
+                TEST_ASSERT_TRUE(temperature_ceiling_c(&ceiling, 4) > twin_c[m] - 3.0f);
+            }
+        }
+        declare_model(&parameters);
+        TEST_ASSERT_UINT16_WITHIN(66, WHOLE, ceiling.loss_share[4]);
+        TEST_ASSERT_UINT16_WITHIN(66, WHOLE, ceiling.capacity_share[4]);
     }
 }
 
