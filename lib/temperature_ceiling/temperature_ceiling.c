@@ -144,10 +144,13 @@ void temperature_ceiling_give(temperature_ceiling_t *ceiling, const thermal_mode
     seal(ceiling, k);
 }
 
-/* Nobody calls it cold while it is given power, however little it has got by now. */
-static bool is_cold(const temperature_ceiling_t *ceiling, uint8_t k)
+/* Nobody calls it cold while it is given power, however little it has got by now; nor, once it was
+ * given any, while another size of the array has it not: its time stands still. */
+static bool is_cold(const temperature_ceiling_t *ceiling, const thermal_model_t *model, uint8_t k)
 {
-    return ceiling->rest_turns[k] != 0 && !temperature_ceiling_is_warm(ceiling, k);
+    return k < model->springs
+               ? ceiling->rest_turns[k] != 0 && !temperature_ceiling_is_warm(ceiling, k)
+               : ceiling->rest_turns[k] == TEMPERATURE_CEILING_NEVER;
 }
 
 /* Given, or until the springs are cold again. */
@@ -157,8 +160,8 @@ static void account(temperature_ceiling_t *ceiling, const thermal_model_t *model
     const int16_t ambient_c7 = thermal_model_ambient_c7(model);
     if (k == 0) {
         bool cold = true;
-        for (uint8_t j = 0; j < model->springs && cold; j++) {
-            cold = is_cold(ceiling, j);
+        for (uint8_t j = 0; j < THERMAL_MODEL_MAX_SPRINGS && cold; j++) {
+            cold = is_cold(ceiling, model, j);
         }
         if (cold) {
             ceiling->delivered = false;
@@ -205,8 +208,8 @@ temperature_ceiling_declared_t temperature_ceiling_declared(const thermal_model_
     const thermal_model_parameters_t *const p = &model->parameters;
     const float plate_w_per_k = 1e-6f * (float)p->plate_coupling_uw_per_k;
     const float neighbours_w_per_k = 1e-6f * (float)couplings_uw_per_k(model, k);
-    const float loss_w_per_k = 1e-6f / (float)(HOT_C - COOL_C) * (float)more_uw - plate_w_per_k -
-                               neighbours_w_per_k;
+    const float loss_w_per_k =
+        1e-6f / (float)(HOT_C - COOL_C) * (float)more_uw - plate_w_per_k - neighbours_w_per_k;
     const float capacity = capacity_j_per_k(model, k);
     return (temperature_ceiling_declared_t){
         .loss_w_per_k = loss_w_per_k,
@@ -258,8 +261,7 @@ void temperature_ceiling_declare(temperature_ceiling_t *ceiling, const thermal_m
         const float heat = change(before->heat_j, now.heat_j);
         ceiling->loss_share[k] =
             share_of(ceiling->loss_share[k], larger(larger(loss, plate), neighbours));
-        ceiling->capacity_share[k] =
-            share_of(ceiling->capacity_share[k], larger(capacity, heat));
+        ceiling->capacity_share[k] = share_of(ceiling->capacity_share[k], larger(capacity, heat));
     }
     seal(ceiling, k);
 }

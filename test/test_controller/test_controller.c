@@ -8,6 +8,7 @@
 
 #include "../run_tests.h"
 #include "controller.h"
+#include "fixed_point.h"
 
 #define AMBIENT_C7 (20 * 128)
 
@@ -293,7 +294,7 @@ TEST(no_hint_takes_heat_that_was_given)
 {
     controller_settings_t other;
     thermal_model_state_t cold;
-    for (int hint = 0; hint < 7; hint++) {
+    for (int hint = 0; hint < 8; hint++) {
         controller_settings_default(&settings);
         settings.policy.policy = DRIVE_POLICY_OPEN;
         start();
@@ -337,7 +338,15 @@ TEST(no_hint_takes_heat_that_was_given)
             run(50u * 10u);
             model_stays = false;
             break;
-        case 5:
+        case 5: /* without it the others are cold */
+            other.model.rows = 1;
+            TEST_ASSERT_TRUE(controller_apply_settings(&controller, &other, NULL));
+            run(50u * 2u);
+            TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+            run(50u * 2u);
+            model_stays = false;
+            break;
+        case 6:
             other.model.heat_capacity_mj_per_k *= 4u;
             TEST_ASSERT_TRUE(controller_apply_settings(&controller, &other, NULL));
             break;
@@ -347,7 +356,6 @@ TEST(no_hint_takes_heat_that_was_given)
             TEST_ASSERT_TRUE(controller_apply_settings(&controller, &other, NULL));
             break;
         }
-        controller_set_temperature(&controller, AMBIENT_C7); /* `model cold` */
         TEST_ASSERT_TRUE(controller_is_warm(&controller, 4));
         TEST_ASSERT_TRUE(controller_delivered_c(&controller, 4) > given_c - 8.0f);
         if (model_stays) {
@@ -358,6 +366,25 @@ TEST(no_hint_takes_heat_that_was_given)
     TEST_ASSERT_FALSE(controller_is_warm(&controller, 4));
     controller_set_temperature(&controller, AMBIENT_C7);
     TEST_ASSERT_EQUAL_INT16(AMBIENT_C7, controller_temperature_c7(&controller, 4));
+}
+
+/* Whatever air is told for a while, and then the right one. */
+TEST(no_air_that_may_be_told_takes_heat_that_was_given)
+{
+    settings.policy.open_current_ma = 1900;
+    start();
+    controller_set_target(&controller, 4, 1000);
+    run(50u * 60u);
+    controller_stop(&controller);
+    inputs.ambient_c7 = fixed_point_c7_from_cc((int16_t)parameter_row(PARAMETER_ambient_c).maximum);
+    run(50u * 2u);
+    inputs.ambient_c7 = AMBIENT_C7;
+    run(50u * 2u);
+    const float given_c = controller_delivered_c(&controller, 4);
+    TEST_ASSERT_FLOAT_WITHIN(8.0f, 75.0f, given_c);
+    controller_set_temperature(&controller, AMBIENT_C7);
+    TEST_ASSERT_TRUE(controller_is_warm(&controller, 4));
+    TEST_ASSERT_TRUE(controller_temperature_c7(&controller, 4) > 55 * 128);
 }
 
 /* Open loop heats springs of which nobody knows anything, so their model is no more than a guess:
