@@ -79,8 +79,25 @@ static bool check_time_constants(const thermal_model_parameters_t *p, uint16_t *
     return true;
 }
 
-/* All parts but the model, which checks itself when it takes its parameters. */
-static bool check(const controller_settings_t *settings, uint16_t *bad)
+/* Parts of the settings; bits. */
+enum { MODEL_PART = 1, CURRENT_PART = 2, SAFETY_PART = 4, POLICY_PART = 8, ALL_PARTS = 15 };
+
+static uint8_t if_other(const void *now, const void *was, size_t bytes, uint8_t part)
+{
+    return memcmp(now, was, bytes) != 0 ? part : 0;
+}
+
+/* Those that are others than the controller has. */
+static uint8_t others(const controller_t *c, const controller_settings_t *s)
+{
+    return if_other(&s->model, &c->model.parameters, sizeof s->model, MODEL_PART) |
+           if_other(&s->current, &c->current.parameters, sizeof s->current, CURRENT_PART) |
+           if_other(&s->safety, &c->safety.parameters, sizeof s->safety, SAFETY_PART) |
+           if_other(&s->policy, &c->policy.parameters, sizeof s->policy, POLICY_PART);
+}
+
+/* Those of parts but the model, which checks itself when it takes its parameters. */
+static bool check(const controller_settings_t *settings, uint8_t parts, uint16_t *bad)
 {
     if (settings->model.step_ms != MODEL_STEP_MS) {
         if (bad != NULL) {
@@ -95,9 +112,10 @@ static bool check(const controller_settings_t *settings, uint16_t *bad)
         }
         return false;
     }
-    return check_time_constants(&settings->model, bad) &&
-           current_control_check(&settings->current, bad) && safety_check(&settings->safety, bad) &&
-           drive_policy_check(&settings->policy, bad);
+    return ((parts & MODEL_PART) == 0 || check_time_constants(&settings->model, bad)) &&
+           ((parts & CURRENT_PART) == 0 || current_control_check(&settings->current, bad)) &&
+           ((parts & SAFETY_PART) == 0 || safety_check(&settings->safety, bad)) &&
+           ((parts & POLICY_PART) == 0 || drive_policy_check(&settings->policy, bad));
 }
 
 static bool init_model(thermal_model_t *model, const thermal_model_parameters_t *parameters,
@@ -154,7 +172,8 @@ static void start(controller_t *controller, const controller_settings_t *setting
 bool controller_init(controller_t *controller, const controller_settings_t *settings,
                      int16_t ambient_c7, uint16_t *bad)
 {
-    if (!check(settings, bad) || !init_model(&controller->model, &settings->model, bad)) {
+    if (!check(settings, ALL_PARTS, bad) ||
+        !init_model(&controller->model, &settings->model, bad)) {
         return false;
     }
     /* by what it is given from here on: where it may be from before is the estimator's to wait for
@@ -212,26 +231,32 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         return false; /* not even how many springs there are is known */
     }
     const thermal_model_parameters_t *old = &controller->model.parameters;
-    if (!check(settings, bad)) {
+    const uint8_t other = others(controller, settings);
+    if (!check(settings, other, bad)) {
         return false;
     }
     if (settings->model.rows == old->rows && settings->model.columns == old->columns) {
-        if (memcmp(&settings->model, old, sizeof *old) != 0 &&
-            !declare(controller, &settings->model, bad)) {
+        if ((other & MODEL_PART) != 0 && !declare(controller, &settings->model, bad)) {
             return false;
         }
-        if (memcmp(&controller->current.parameters, &settings->current, sizeof settings->current) !=
-            0) {
+        if ((other & CURRENT_PART) != 0) {
             controller->peers = (circuit_peers_t){0}; /* it is another circuit */
             circuit_source_begin(&controller->source, &settings->current);
             memset(controller->mistrusted, 0, sizeof controller->mistrusted);
+            (void)current_control_apply(&controller->current, &settings->current, NULL);
+            current_control_set_drop(&controller->current, controller->source.driven_drop_mv);
         }
-        (void)current_control_apply(&controller->current, &settings->current, NULL);
-        current_control_set_drop(&controller->current, controller->source.driven_drop_mv);
-        temperature_ceiling_prepare(&controller->drive, &controller->model, &settings->current);
-        (void)safety_apply(&controller->safety, &settings->safety, NULL);
-        (void)apply_policy(controller, &settings->policy);
-        tell_resistances(controller);
+        if ((other & SAFETY_PART) != 0) {
+            (void)safety_apply(&controller->safety, &settings->safety, NULL);
+        }
+        /* No more than must be: ticks that are late let the relay of the supply open. */
+        if ((other & (MODEL_PART | CURRENT_PART)) != 0) {
+            temperature_ceiling_prepare(&controller->drive, &controller->model, &settings->current);
+            tell_resistances(controller);
+        }
+        if ((other & (MODEL_PART | POLICY_PART)) != 0) {
+            (void)apply_policy(controller, &settings->policy);
+        }
         scrub_seal(&controller->scrub, controller_fixed, controller); /* all of it is new */
         return true;
     }

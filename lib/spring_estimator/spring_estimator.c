@@ -91,7 +91,6 @@ void spring_estimator_prepare(spring_estimator_t *e, const thermal_model_t *mode
     e->martensite_ohm = (float)p->resistance_martensite_uohm * 1e-6f;
     e->change = 1.0f - (float)p->resistance_martensite_uohm / (float)p->resistance_austenite_uohm;
     for (uint8_t k = 0; k < model->springs; k++) {
-        spring_estimator_look_at_stiffness(e, model, k);
         if (e->spring[k].learnt.austenite_ohm == 0.0f && spring_is_sound(e, k)) {
             e->spring[k].learnt.change = e->change; /* the declared one stands in */
             spring_seal(e, k);
@@ -155,6 +154,7 @@ static void begin_all(spring_estimator_t *e, thermal_model_t *model, bool keeps_
     spring_estimator_prepare(e, model, true);
     for (uint8_t k = 0; k < e->springs; k++) {
         begin_unknown(e, model, k);
+        spring_estimator_look_at_stiffness(e, model, k); /* from here on one in each round */
     }
 }
 

@@ -3,6 +3,7 @@
 #include "board_test.h"
 
 #include <cmath>
+#include <cstring>
 #include <functional>
 
 using namespace board_test;
@@ -90,6 +91,28 @@ TEST(a_welded_switch_heats_until_the_supply_is_off)
         mega.run_ms(300.0);
         TEST_ASSERT_TRUE(board_current_a(mega.raw(), 0) > 0.1);
         TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, mega.view().spring[0].fault);
+    }
+}
+
+/* A line that takes longer than a tick costs pulses: not so many that the relay opens and the
+ * current loops take nothing for a reading, whenever in a tick it comes. */
+TEST(a_setting_in_mid_drive_opens_no_relay)
+{
+    for (const char *line : {"$martensite_start_c=76\n", "$loss_w_per_k=0.0064\n",
+                             "$latent_heat_j=9\n", "$supply_v=5.1\n", "$hold_margin_k=3\n",
+                             "$latent_heat_j=9\n$loss_scale_1=1.1\n$martensite_start_c=77\n"}) {
+        for (double at_ms = 0.0; at_ms < 20.0; at_ms += 5.0) {
+            rig mega;
+            mega.boot_niti({"on all"});
+            mega.run_ms(1000.0 + at_ms);
+            board_send(mega.raw(), line, std::strlen(line));
+            for (int ms = 0; ms < 200; ++ms) {
+                (void)board_run_ms(mega.raw(), 1.0);
+                TEST_ASSERT_TRUE_MESSAGE(board_is_fed(mega.raw()), line);
+                TEST_ASSERT_TRUE_MESSAGE(board_current_a(mega.raw(), 4) > 1.0, line);
+            }
+            mega.expect_says("faults", "ok");
+        }
     }
 }
 
