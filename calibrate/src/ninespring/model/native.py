@@ -41,7 +41,7 @@ class _Doubles:
     @staticmethod
     def from_param(array: np.ndarray | None) -> object:
         """Return where its numbers stand."""
-        return None if array is None else array.ctypes.data_as(_double_p)
+        return None if array is None else ctypes.c_void_p(array.ctypes.data)
 
 
 NOT_IN_TIME = -6
@@ -125,6 +125,7 @@ def library() -> ctypes.CDLL:
         "plant_measured_c": (real, (pointer, integer)),
         "plant_austenite": (real, (pointer, integer)),
         "plant_resistance_ohm": (real, (pointer, integer)),
+        "plant_start_from_measured": (integer, (pointer, _Doubles)),
         "plant_readings": (integer, (pointer, size, *(_Doubles,) * 6)),
         "chip_export": (integer, (pointer, *(integer,) * 4, *message, *message)),
         "chip_simulate": (integer, (text, integer, integer, size, _Doubles, integer, *(_Doubles,) * 7, *message)),
@@ -137,8 +138,8 @@ def library() -> ctypes.CDLL:
             ),
         ),
         "paper_configure": (integer, (pointer, real)),
-        "whiten": (real, (size, size, _double_p, text, _double_p, _double_p, size, _double_p, _double_p)),
-        "weigh": (real, (size, _double_p, _double_p, text, _double_p, size, _double_p, _double_p, _double_p)),
+        "whiten": (real, (size, size, pointer, text, pointer, pointer, size, pointer, pointer)),
+        "weigh": (real, (size, pointer, pointer, text, pointer, size, pointer, pointer, pointer)),
     }
     for function, signature in signatures.items():
         entry = getattr(lib, function)
@@ -314,20 +315,7 @@ class Plant:
     def start_from_measured(self, first_c: np.ndarray) -> None:
         """Put the springs where the sensors would show `first_c` (NaN: stays where it is)."""
         first_c = _shaped("first_c", first_c, (self.springs,))
-        seen = np.flatnonzero(np.isfinite(first_c))
-        if not seen.size:
-            return
-        wanted = np.clip(first_c, -60.0, 500.0)
-        guess, least = wanted.copy(), np.inf
-        for _ in range(40):
-            for k in seen:
-                self.set_temperature(int(k), guess[k])
-            off = wanted[seen] - self.measured_c()[seen]
-            # what a strong blur takes away altogether never comes back: ends where it comes no nearer
-            if (left := float(np.abs(off).max())) < 1e-3 or left > 0.98 * least:
-                break
-            least = left
-            guess[seen] = np.clip(guess[seen] + off, -60.0, 500.0)
+        self._check(self._lib.plant_start_from_measured(self._plant, first_c), "first temperatures")
 
     def readings(
         self, time_s: np.ndarray, power_w: np.ndarray, fan: np.ndarray, ambient_c: np.ndarray | None
