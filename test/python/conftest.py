@@ -26,8 +26,7 @@ def kept_elsewhere(tmp_path_factory: pytest.TempPathFactory) -> None:
     os.environ["NINESPRING_HOME"] = str(tmp_path_factory.mktemp("kept"))
 
 
-@pytest.fixture
-def make_log(tmp_path: Path) -> Make:
+def _maker(folder: Path) -> Make:
     """Return a maker of 3 x 3 logs: effects and numbers of the plant, noise, seed, seconds, what is logged, the fan at half."""
 
     def make(
@@ -71,11 +70,23 @@ def make_log(tmp_path: Path) -> Make:
         if change:
             change(out)
         stamps = out.pop("time_s", time_s)
-        path = tmp_path / name
+        path = folder / name
         path.write_text(log_text(stamps, out))
         return path
 
     return make
+
+
+@pytest.fixture
+def make_log(tmp_path: Path) -> Make:
+    """Return a maker of logs of one test."""
+    return _maker(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def make_shared_log(tmp_path_factory: pytest.TempPathFactory) -> Make:
+    """Return a maker of logs from which something is made once for all tests of a file."""
+    return _maker(tmp_path_factory.mktemp("shared"))
 
 
 @pytest.fixture

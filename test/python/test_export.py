@@ -28,11 +28,12 @@ def lukewarm(columns: dict[str, np.ndarray]) -> None:
         columns[f"t{k}_c"] = 20.0 + 0.25 * (columns[f"t{k}_c"] - 20.0)
 
 
-@pytest.fixture
-def cold(make_log, tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def cold(make_shared_log) -> Path:
     """Return a model of a log that never comes near the transformation."""
-    found = diagnosis.diagnose(Array(), [read_log(make_log("cold.csv", change=lukewarm))])
-    path = tmp_path / "cold.toml"
+    log = make_shared_log("cold.csv", change=lukewarm)
+    found = diagnosis.diagnose(Array(), [read_log(log)])
+    path = log.with_suffix(".toml")
     path.write_text(model_text(found.model))
     return path
 

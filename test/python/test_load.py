@@ -11,6 +11,7 @@ from ninespring.export.settings import settings_of
 from ninespring.find import diagnosis
 from ninespring.infer.predict import predict
 from ninespring.io.logs import log_text, read_log
+from ninespring.io.logs.run import Run
 from ninespring.model import native
 from ninespring.model.models import Array, model_text, read_model
 from ninespring.model.simulate import LOAD_STEP_N, load_changes, simulate_run
@@ -62,8 +63,13 @@ def loaded(path: Path, k_per_n: float, seed: int) -> Path:
     return path
 
 
-def test_what_is_shown_as_a_load_moves_is_from_before(tmp_path: Path) -> None:
-    run = read_log(loaded(tmp_path / "log.csv", K_PER_N, 1), 2)
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """Return a log of a load that moves the transformation."""
+    return read_log(loaded(tmp_path_factory.mktemp("load") / "log.csv", K_PER_N, 1), 2)
+
+
+def test_what_is_shown_as_a_load_moves_is_from_before(run: Run) -> None:
     shown = []
     for lag_s in (None, 0.02):
         plant = native.Plant(1, 2)
@@ -76,8 +82,7 @@ def test_what_is_shown_as_a_load_moves_is_from_before(tmp_path: Path) -> None:
     assert np.abs(shown[0] - shown[1]).max() < 0.3
 
 
-def test_a_load_is_found_sized_and_predicted(tmp_path: Path) -> None:
-    run = read_log(loaded(tmp_path / "log.csv", K_PER_N, 1), 2)
+def test_a_load_is_found_sized_and_predicted(run: Run, tmp_path: Path) -> None:
     found = diagnosis.diagnose(Array(1, 2), [run])
     named = {one["name"]: one for one in found.result["effects"]}
     assert set(named) == {"latent_heat", "transformation_shift"}
