@@ -67,14 +67,16 @@ class Page(HTMLParser):
         return next(row for row in self.rows if row and row[0] == first)
 
 
-@pytest.fixture
-def found(make_log) -> diagnosis.Diagnosis:
+@pytest.fixture(scope="module")
+def found(make_shared_log) -> diagnosis.Diagnosis:
     """Return a diagnosis of two runs: phase change, a slow sensor, a spring that is not measured, a gap."""
     effects = {"latent_heat": {"latent_heat_j": 8.0}, "sensor_lag": {"sensor_lag_s": 5.0}}
 
     logs = [
-        make_log("a<b.csv", effects, seed=1, change=lambda c: c.pop("t5_c")),
-        make_log("gap.csv", effects, seed=2, change=lambda c: (keep_rows(c, np.r_[0:250, 320:600]), c.pop("t5_c"))),
+        make_shared_log("a<b.csv", effects, seed=1, change=lambda c: c.pop("t5_c")),
+        make_shared_log(
+            "gap.csv", effects, seed=2, change=lambda c: (keep_rows(c, np.r_[0:250, 320:600]), c.pop("t5_c"))
+        ),
     ]
     return diagnosis.diagnose(Array(), [read_log(log) for log in logs])
 
