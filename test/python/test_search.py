@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from made import searched
-from ninespring.find import diagnosis, evidence, experiments, search
+from ninespring.find import diagnosis, evidence, experiments, residual, search
 from ninespring.find.plan import plan_experiment
 from ninespring.infer import budget, room
 from ninespring.infer.declared import base_spec
@@ -496,17 +496,18 @@ def test_a_run_that_does_not_begin_as_logged_is_said(make_log) -> None:
         for k in range(1, 10):
             columns[f"t{k}_c"] = columns[f"t{k}_c"] + 6.0 * np.exp(-((np.arange(600.0) - 30) ** 2) / 200)
 
-    result = diagnosis.diagnose(Array(), [read_log(make_log(change=late))]).result
-    assert result["unexplained"] is True
-    assert any("the start of run 1" in text for text in result["residual"]["depends_on"])
+    left = searched(read_log(make_log(change=late)))
+    names, _ = residual.depends_on(left.problem, left.base)
+    assert any("the start of run 1" in text for text in names)
 
 
 def test_correlations_of_the_rest_are_correlations(make_log) -> None:
     def pickup(columns: dict[str, np.ndarray]) -> None:
         columns["t3_c"] = columns["t3_c"] + 3.0 * columns["i3_a"]
 
-    result = diagnosis.diagnose(Array(), [read_log(make_log(change=pickup))]).result
-    said = [text for text in result["residual"]["depends_on"] if "r = " in text]
+    left = searched(read_log(make_log(change=pickup)))
+    names, _ = residual.depends_on(left.problem, left.base)
+    said = [text for text in names if "r = " in text]
     assert any("drive of spring 3 (seen at spring 3" in text for text in said)
     assert all(abs(float(text.split("r = ")[1].rstrip(")"))) <= 1.0 for text in said)
 
