@@ -279,6 +279,7 @@ def test_a_trickle_of_heat_is_no_thermometer_with_an_offset(make_log) -> None:
     assert cause["size"] == pytest.approx(0.06, abs=0.005)
 
 
+@pytest.mark.nightly
 def test_names_that_stand_in_for_a_trickle_of_heat_go_and_the_true_one_stays(make_log) -> None:
     """A thermometer's gain and a spring's own loss would explain it together, beside the latent heat that is there."""
 
