@@ -6,12 +6,10 @@ import io
 import math
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("svg")
-import matplotlib.pyplot as plt
+import matplotlib as mpl
 import numpy as np
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
 from ..find.diagnosis import Diagnosis
 from ..infer.fit import Fit
@@ -19,16 +17,37 @@ from ..io import statistics
 from ..io.logs.run import Run
 
 INK, MEASURED, BEFORE, AFTER = "#1d2733", "#9aa7b4", "#c8553d", "#1f77a4"
-plt.rcParams.update(
+mpl.rcParams.update(
     {"svg.fonttype": "none", "font.family": "sans-serif", "text.color": INK, "axes.edgecolor": "#c3ccd4"}
 )
 
 
-def as_svg(figure: Any) -> Markup:
-    """Return a figure as SVG that stands in a page; it is closed."""
+def panels(
+    rows: int,
+    cols: int,
+    size: tuple[float, float],
+    margins: tuple[float, float, float, float],
+    gap: tuple[float, float] = (0.0, 0.0),
+    **more: Any,
+) -> tuple[Figure, np.ndarray]:
+    """Return a figure of panels (rows, cols), each of a size, between margins (left, right, bottom, top), inches.
+
+    What stands in the margins is known: to have it measured, matplotlib draws all of it several times over.
+    """
+    left, right, bottom, top = margins
+    wide = left + right + cols * size[0] + (cols - 1) * gap[0]
+    high = bottom + top + rows * size[1] + (rows - 1) * gap[1]
+    figure = Figure(figsize=(wide, high))
+    figure.subplots_adjust(
+        left / wide, bottom / high, 1 - right / wide, 1 - top / high, gap[0] / size[0], gap[1] / size[1]
+    )
+    return figure, figure.subplots(rows, cols, squeeze=False, **more)
+
+
+def as_svg(figure: Figure) -> Markup:
+    """Return a figure as SVG that stands in a page."""
     out = io.StringIO()
-    figure.savefig(out, format="svg", bbox_inches="tight")
-    plt.close(figure)
+    figure.savefig(out, format="svg")
     text = out.getvalue()
     return Markup(text[text.index("<svg") :])
 
@@ -49,13 +68,14 @@ def traces(found: Diagnosis) -> list[tuple[Markup, Markup]]:
         breaks = np.unique([0, *(np.searchsorted(np.arange(len(run.time_s))[pick], run.starts))])
         pair = []
         for residual in (False, True):
-            figure, axes = plt.subplots(
+            figure, axes = panels(
                 array.rows,
                 array.cols,
-                figsize=(max(3.7 * array.cols, 7.4), 2.1 * array.rows + 0.9),
+                (max(3.45, 6.5 / array.cols), 1.83),
+                (0.75, 0.12, 0.62, 0.5),
+                (0.2, 0.32),
                 sharex=True,
                 sharey=True,
-                squeeze=False,
             )
             for k in range(run.springs):
                 axis = axes[k // array.cols][k % array.cols]
@@ -80,10 +100,10 @@ def traces(found: Diagnosis) -> list[tuple[Markup, Markup]]:
                 axis.grid(alpha=0.25)
                 axis.tick_params(labelsize=8)
             handles, labels = axes[0][0].get_legend_handles_labels()
+            wide, high = figure.get_size_inches()
             figure.legend(handles, labels, fontsize=9, frameon=False, ncols=3, loc="upper right")
-            figure.supxlabel("time since the beginning of the run, s", fontsize=9)
-            figure.supylabel("measured less model, K" if residual else "temperature, °C", fontsize=9)
-            figure.tight_layout(rect=(0, 0, 1, 1.0 - 0.25 / figure.get_figheight()))
+            figure.supxlabel("time since the beginning of the run, s", fontsize=9, y=0.1 / high)
+            figure.supylabel("measured less model, K" if residual else "temperature, °C", fontsize=9, x=0.1 / wide)
             pair.append(as_svg(figure))
         figures.append((pair[0], pair[1]))
     return figures
@@ -127,9 +147,14 @@ def array_map(found: Diagnosis) -> Markup:
     """Draw what is left at each spring in multiples of its sensor's noise, with a colour bar."""
     shape = (found.problem.array.rows, found.problem.array.cols)
     rms = np.sqrt(statistics.mean_there(np.concatenate(_in_noise(found, found.final)) ** 2, 0))
-    figure, axis = plt.subplots(figsize=(4.2, min(4.2, 0.8 + 3.4 * shape[0] / shape[1])))
-    shown = _tiles(axis, rms, shape, "YlOrRd", 1.0, max(3.0, float(np.nanmax(rms))), "{:.1f}")
-    figure.colorbar(shown, ax=axis, shrink=0.8, label="rms error / noise")
+    cell = 3.0 / max(shape[1], 0.9 * shape[0])
+    size = (shape[1] * cell, shape[0] * cell)
+    above = max(0.1, 0.75 - 0.5 * size[1])  # words beside may be longer than what they stand beside
+    side = 0.5 * (3.0 - size[0])
+    figure, axes = panels(1, 1, size, (0.1 + side, 0.95 + side, above, above))
+    shown = _tiles(axes[0, 0], rms, shape, "YlOrRd", 1.0, max(3.0, float(np.nanmax(rms))), "{:.1f}")
+    beside = axes[0, 0].inset_axes((1.0 + 0.12 / size[0], 0.0, 0.15 / size[0], 1.0))
+    figure.colorbar(shown, cax=beside, label="rms error / noise")
     return as_svg(figure)
 
 
@@ -140,9 +165,8 @@ def unknown_heat(found: Diagnosis) -> str:
     if most <= 0:
         return ""
     springs, runs = found.problem.array.springs, len(heat.watts)
-    figure, axes = plt.subplots(
-        runs, 1, figsize=(9.0, 0.9 + runs * max(0.9, 0.2 * springs)), squeeze=False, layout="constrained"
-    )
+    panel = (7.4, max(0.8, 0.2 * springs))
+    figure, axes = panels(runs, 1, panel, (0.6, 1.45, 0.45, 0.1), (0.0, 0.3))
     for r, (axis, times, watts) in enumerate(zip(axes[:, 0], heat.times_s, heat.watts, strict=True)):
         pick = _thin(len(times))
         edges = np.append(times[pick], times[-1]) - times[0]
@@ -155,7 +179,10 @@ def unknown_heat(found: Diagnosis) -> str:
         axis.set_ylabel(f"run {r + 1}, spring", fontsize=8)
         axis.tick_params(labelsize=7)
     axes[-1, 0].set_xlabel("s", fontsize=8)
-    figure.colorbar(shown, ax=axes[:, 0], label="W more (red) or less (blue) than known")
+    beside = axes[-1, 0].inset_axes(
+        (1.0 + 0.12 / panel[0], 0.0, 0.15 / panel[0], 1.0 + (runs - 1) * (1.0 + 0.3 / panel[1]))
+    )
+    figure.colorbar(shown, cax=beside, label="W more (red)\nor less (blue)\nthan known")
     return as_svg(figure)
 
 
@@ -169,11 +196,13 @@ def maps(found: Diagnosis) -> Markup:
         pictures.append((np.sqrt(statistics.mean_there(left**2, 0)), f"rms error {label}, K", "YlOrRd", "{:.2f}"))
         pictures.append((statistics.mean_there(left, 0), f"mean error {label}, K", "RdBu_r", "{:+.2f}"))
     most = [max(1e-9, *(float(np.nanmax(np.abs(pictures[k + j][0]))) for j in (0, 2))) for k in (0, 1)]
-    figure, axes = plt.subplots(1, 4, figsize=(12, min(3.2, 0.6 + 2.6 * shape[0] / shape[1])))
-    for k, (axis, (values, title, colours, form)) in enumerate(zip(axes, pictures, strict=True)):
+    wide = 2.8 * min(1.0, shape[1] / shape[0])
+    side = max(0.1, 0.75 - 0.5 * wide)  # a title may be wider than what it stands above
+    size, gap = (wide, wide * shape[0] / shape[1]), (2.95 - wide, 0.0)
+    figure, axes = panels(1, 4, size, (side, side, 0.1, 0.3), gap)
+    for k, (axis, (values, title, colours, form)) in enumerate(zip(axes[0], pictures, strict=True)):
         _tiles(axis, values, shape, colours, -most[1] if k % 2 else 0.0, most[k % 2], form)
         axis.set_title(title, fontsize=9)
-    figure.tight_layout()
     return as_svg(figure)
 
 
@@ -182,7 +211,7 @@ def autocorrelation(found: Diagnosis) -> Markup:
     problem = found.problem
     lags = min(120, problem.longest_lag())
     step = float(np.median(np.diff(problem.runs[0].time_s)))
-    figure, axes = plt.subplots(1, 2, figsize=(12, 3.0))
+    figure, (axes,) = panels(1, 2, (5.2, 2.3), (0.6, 0.1, 0.5, 0.3), (0.7, 0.0))
     for fit, colour, label in ((found.baseline, BEFORE, "before"), (found.final, AFTER, "after")):
         left = _in_noise(found, fit)
         rho = statistics.autocorrelation(left, lags)
@@ -203,5 +232,4 @@ def autocorrelation(found: Diagnosis) -> Markup:
         axis.legend(fontsize=8, frameon=False)
         axis.grid(alpha=0.25)
         axis.tick_params(labelsize=8)
-    figure.tight_layout()
     return as_svg(figure)

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from markupsafe import Markup
 
 from ...io import results
 from ...io.logs import read_log
 from ...model.models import Array
-from ...say.figures import AFTER, BEFORE, INK, MEASURED, as_svg
+from ...say.figures import AFTER, BEFORE, INK, MEASURED, as_svg, panels
 from ...say.page import error_rows, render
 from ...say.plotting import believed
 from .chain import DIAGNOSIS, OLD_SETTINGS, SETTINGS
@@ -70,7 +69,7 @@ def _picture(progress: Progress, array: Array, shown: Sequence[dict[str, Any]]) 
     on = [k for k, one in enumerate(progress.option("pattern")) if one == "1"]
     off = [k for k in range(array.springs) if k not in on]
     picked = list(dict.fromkeys([max(on, key=lambda k: error[k]), min(on, key=lambda k: error[k]), *off[:1]]))
-    figure, axes = plt.subplots(1, len(runs), figsize=(5.2 * len(runs), 3.6), sharey=True, squeeze=False)
+    figure, axes = panels(1, len(runs), (4.8, 2.9), (0.65, 0.1, 0.5, 0.3), (0.2, 0.0), sharey=True)
     for axis, run, belief, name in zip(axes[0], runs, thought, NAMES, strict=False):
         since = run.time_s - run.time_s[0]
         for k, colour in zip(picked, COLOURS, strict=False):
@@ -82,5 +81,4 @@ def _picture(progress: Progress, array: Array, shown: Sequence[dict[str, Any]]) 
         axis.tick_params(labelsize=8)
     axes[0][0].set_ylabel("temperature, °C", fontsize=9)
     axes[0][0].legend(fontsize=8, frameon=False, loc="lower right")
-    figure.tight_layout()
     return as_svg(figure)
