@@ -374,6 +374,14 @@ std::vector<injected> catalogue()
         {"cold declared after another size",
          {say(0, "off all"), say(0.1, "$rows=1"), say(1.5, "$rows=3"), say(1.7, "model cold")}},
         {"air of -40 degC declared", {say(0, "ambient -40")}},
+        {"losses by the fan x 3.4 declared, then the fan",
+         {say(0, "$loss_fan_w_per_k=0.0384"), say(0.5, "fan 100")}},
+        {"losses by the fan x 5.8 declared, then the fan",
+         {say(0, "$loss_fan_w_per_k=0.065"), say(0.5, "fan 100")}},
+        {"neighbours by the fan x 24 declared, then the fan",
+         {say(0, "$orthogonal_fan_w_per_k=0.016"), say(0.5, "fan 100")}},
+        {"half of the fan declared, then the fan",
+         {say(0, "$fan_half_share=0.9"), say(0.5, "fan 50")}},
     };
 }
 

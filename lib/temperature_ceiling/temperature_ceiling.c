@@ -200,6 +200,22 @@ static uint32_t couplings_uw_per_k(const thermal_model_t *model, uint8_t k)
     return sum_uw_per_k;
 }
 
+/* How many neighbours there are one row or column away, and both. */
+static temperature_ceiling_fan_t with_fan(const thermal_model_t *model, uint8_t k,
+                                          uint16_t loss_uw_per_k, uint16_t orthogonal_uw_per_k,
+                                          uint16_t diagonal_uw_per_k)
+{
+    const thermal_model_spring_t *const spring = &model->spring[k];
+    const thermal_model_parameters_t *const p = &model->parameters;
+    const uint8_t vertical = (uint8_t)((spring->row > 0) + (spring->row + 1 < p->rows));
+    const uint8_t horizontal = (uint8_t)((spring->column > 0) + (spring->column + 1 < p->columns));
+    return (temperature_ceiling_fan_t){
+        .loss_uw_per_k = loss_uw_per_k,
+        /* conductances fit 16 bits, or the model has refused them */
+        .neighbours_uw_per_k = (uint16_t)((uint8_t)(vertical + horizontal) * orthogonal_uw_per_k +
+                                          (uint8_t)(vertical * horizontal) * diagonal_uw_per_k)};
+}
+
 temperature_ceiling_declared_t temperature_ceiling_declared(const thermal_model_t *model, uint8_t k)
 {
     /* the difference: what flows at one temperature is its neighbours', too */
@@ -217,7 +233,12 @@ temperature_ceiling_declared_t temperature_ceiling_declared(const thermal_model_
         .with_neighbours_w_per_k = loss_w_per_k + neighbours_w_per_k,
         .capacity_j_per_k = capacity,
         .heat_j = capacity *
-                  (TEMPERATURE_CEILING_HEATED_K + (float)model->latent_full_c8 * (1.0f / 256.0f))};
+                  (TEMPERATURE_CEILING_HEATED_K + (float)model->latent_full_c8 * (1.0f / 256.0f)),
+        .still = with_fan(model, k, model->spring[k].loss_natural_uw_per_k, p->orthogonal_uw_per_k,
+                          p->diagonal_uw_per_k),
+        .blown = with_fan(model, k, model->spring[k].loss_fan_uw_per_k, p->orthogonal_fan_uw_per_k,
+                          p->diagonal_fan_uw_per_k),
+        .half_share = 1e-3f * (float)p->fan_half_share_permille};
 }
 
 static float of_share(float value, uint16_t share)
@@ -229,8 +250,10 @@ static float of_share(float value, uint16_t share)
  * moves all of them the same way, and taken back it takes back as much. */
 static float larger(float one, float other)
 {
-    const float one_times = one < 1.0f ? 1.0f / one : one;
-    return one_times > (other < 1.0f ? 1.0f / other : other) ? one : other;
+    const bool same_way = (one < 1.0f) == (other < 1.0f);
+    const bool one_is_larger = one < 1.0f ? (same_way ? one < other : one * other < 1.0f)
+                                          : (same_way ? one > other : one * other > 1.0f);
+    return one_is_larger ? one : other;
 }
 
 /* What was declared before is so many times what is now. */
@@ -247,20 +270,76 @@ static uint16_t share_of(uint16_t share, float kept)
     return (uint16_t)clamp((float)share * kept, 1.0f, (float)WHOLE_SHARE);
 }
 
+/* At a fan between still and blown. */
+typedef struct {
+    float loss_w_per_k;
+    float with_plate_w_per_k;
+    float with_neighbours_w_per_k;
+} losses_t;
+
+static losses_t losses_at(const temperature_ceiling_declared_t *d, float fan)
+{
+    const float loss_w_per_k = 1e-6f * ((1.0f - fan) * (float)d->still.loss_uw_per_k +
+                                        fan * (float)d->blown.loss_uw_per_k);
+    return (losses_t){
+        .loss_w_per_k = loss_w_per_k,
+        .with_plate_w_per_k = loss_w_per_k + (d->with_plate_w_per_k - d->loss_w_per_k),
+        .with_neighbours_w_per_k =
+            loss_w_per_k + 1e-6f * ((1.0f - fan) * (float)d->still.neighbours_uw_per_k +
+                                    fan * (float)d->blown.neighbours_uw_per_k)};
+}
+
+static float change_at(losses_t before, losses_t now)
+{
+    const float loss = change(before.loss_w_per_k, now.loss_w_per_k);
+    const float plate = change(before.with_plate_w_per_k, now.with_plate_w_per_k);
+    const float neighbours = change(before.with_neighbours_w_per_k, now.with_neighbours_w_per_k);
+    return larger(larger(loss, plate), neighbours);
+}
+
+static losses_t losses_now(const temperature_ceiling_declared_t *d)
+{
+    return (losses_t){d->loss_w_per_k, d->with_plate_w_per_k, d->with_neighbours_w_per_k};
+}
+
+static bool is_alike(losses_t a, losses_t b)
+{
+    return a.loss_w_per_k == b.loss_w_per_k && a.with_plate_w_per_k == b.with_plate_w_per_k &&
+           a.with_neighbours_w_per_k == b.with_neighbours_w_per_k;
+}
+
+/* At the present fan and at those that may be told next, off, full, and half where what that does
+ * is another share of both: at a fan between, losses change by no more than at one of these. Each
+ * takes divisions, and no tick runs meanwhile: what is as it was takes none. */
+static float loss_change(const temperature_ceiling_declared_t *before,
+                         const temperature_ceiling_declared_t *now, uint8_t fan_percent)
+{
+    const bool other_half = before->half_share != now->half_share;
+    float most = change_at(losses_now(before), losses_now(now));
+    for (uint8_t percent = 0; percent <= 100; percent = (uint8_t)(percent + 50)) {
+        if (percent == fan_percent || (percent == 50 && !other_half)) {
+            continue;
+        }
+        const float fan = 0.01f * (float)percent;
+        const losses_t was = losses_at(before, percent == 50 ? before->half_share : fan);
+        const losses_t is = losses_at(now, percent == 50 ? now->half_share : fan);
+        if (!is_alike(was, is)) {
+            most = larger(most, change_at(was, is));
+        }
+    }
+    return most;
+}
+
 void temperature_ceiling_declare(temperature_ceiling_t *ceiling, const thermal_model_t *model,
                                  uint8_t k, const temperature_ceiling_declared_t *before)
 {
     open_spring(ceiling, model, k);
     if (ceiling->delivered) {
         const temperature_ceiling_declared_t now = temperature_ceiling_declared(model, k);
-        const float loss = change(before->loss_w_per_k, now.loss_w_per_k);
-        const float plate = change(before->with_plate_w_per_k, now.with_plate_w_per_k);
-        const float neighbours =
-            change(before->with_neighbours_w_per_k, now.with_neighbours_w_per_k);
         const float capacity = change(before->capacity_j_per_k, now.capacity_j_per_k);
         const float heat = change(before->heat_j, now.heat_j);
         ceiling->loss_share[k] =
-            share_of(ceiling->loss_share[k], larger(larger(loss, plate), neighbours));
+            share_of(ceiling->loss_share[k], loss_change(before, &now, model->fan_percent));
         ceiling->capacity_share[k] = share_of(ceiling->capacity_share[k], larger(capacity, heat));
     }
     seal(ceiling, k);

@@ -55,13 +55,23 @@ bool temperature_ceiling_is_warm(const temperature_ceiling_t *ceiling, uint8_t s
 /* Since it was given power itself, s; TEMPERATURE_CEILING_NEVER: not since power-on, or so long. */
 uint16_t temperature_ceiling_rest_s(const temperature_ceiling_t *ceiling, uint8_t spring);
 
+/* What of a spring's losses a fan decides, off or full. */
+typedef struct {
+    uint16_t loss_uw_per_k;
+    uint16_t neighbours_uw_per_k; /* what joins it with them */
+} temperature_ceiling_fan_t;
+
 /* What a model declares of a spring, wherever it and its neighbours are. */
 typedef struct {
-    float loss_w_per_k; /* to the air: what flows to neighbours and plate stays in the array */
+    float loss_w_per_k; /* to the air at the present fan: what flows to neighbours and plate stays
+                           in the array */
     float with_plate_w_per_k;
     float with_neighbours_w_per_k; /* the loss and what joins it with them */
     float capacity_j_per_k;
     float heat_j; /* that warms it by TEMPERATURE_CEILING_HEATED_K and transforms it */
+    temperature_ceiling_fan_t still;
+    temperature_ceiling_fan_t blown;
+    float half_share; /* of the way from the one to the other, what the fan does at half */
 } temperature_ceiling_declared_t;
 temperature_ceiling_declared_t temperature_ceiling_declared(const thermal_model_t *model,
                                                             uint8_t spring);
@@ -71,8 +81,9 @@ void temperature_ceiling_give(temperature_ceiling_t *ceiling, const thermal_mode
 /* Another model is declared; before: by the one until now. From the first power on, until all
  * springs are cold and none is given any, of both the smaller loss and heat capacity count: a
  * spring that is hot by the numbers of before is not colder by what is said of it. A plate or
- * neighbours that are said to take more take no more than before, nor does a latent heat; as if the
- * loss or the heat capacity had been declared so many times as large. */
+ * neighbours that are said to take more take no more than before, nor does a fan, before it is
+ * switched on or off, nor a latent heat; as if the loss or the heat capacity had been declared so
+ * many times as large. */
 void temperature_ceiling_declare(temperature_ceiling_t *ceiling, const thermal_model_t *model,
                                  uint8_t spring, const temperature_ceiling_declared_t *before);
 

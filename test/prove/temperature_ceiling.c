@@ -10,11 +10,16 @@ static void any_model(thermal_model_t *model)
     thermal_model_parameters_t *const values = &model->parameters;
 #define MODEL PROVE_ANY
 #include "parameters.def"
+    model->fan_percent = any_u8();
     model->springs = (spring_index_t)any_between(1, THERMAL_MODEL_MAX_SPRINGS);
     model->latent_full_c8 = (uint16_t)any_between(0, 80 * 256);
     for (uint8_t k = 0; k < THERMAL_MODEL_MAX_SPRINGS; k++) {
         values->heat_capacity_scale_permille[k] = (uint16_t)any_between(1, 8000);
         model->spring[k].loss_uw_per_k = any_u16();
+        model->spring[k].loss_natural_uw_per_k = any_u16();
+        model->spring[k].loss_fan_uw_per_k = any_u16();
+        model->spring[k].row = any_u8();
+        model->spring[k].column = any_u8();
     }
 }
 

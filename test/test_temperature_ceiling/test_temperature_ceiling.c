@@ -87,7 +87,9 @@ static void declare_model(const thermal_model_parameters_t *now)
         before[k] = temperature_ceiling_declared(&model, k);
     }
     thermal_model_get_state(&model, &state);
+    const uint8_t fan_percent = model.fan_percent;
     TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, now, NULL));
+    thermal_model_set_fan(&model, fan_percent);
     (void)thermal_model_set_state(&model, &state);
     for (uint8_t k = 0; k < model.springs; k++) {
         temperature_ceiling_declare(&ceiling, &model, k, &before[k]);
@@ -218,6 +220,52 @@ TEST(what_else_is_said_to_take_heat_takes_no_more_of_a_warm_spring)
         declare_model(&parameters);
         TEST_ASSERT_UINT16_WITHIN(66, WHOLE, ceiling.loss_share[4]);
         TEST_ASSERT_UINT16_WITHIN(66, WHOLE, ceiling.capacity_share[4]);
+    }
+}
+
+/* What is declared of a fan that is switched on or off only then: as above. */
+TEST(what_a_fan_is_said_to_take_counts_before_it_is_told)
+{
+    static const struct {
+        uint16_t loss_uw, orthogonal_uw, diagonal_uw, half_permille, plate_uw;
+        uint8_t before_percent, then_percent;
+    } row[] = {{38000, 658, 329, 500, 0, 0, 100},    {38000, 658, 329, 500, 0, 0, 30},
+               {11300, 12000, 329, 500, 0, 0, 100},  {11300, 658, 12000, 500, 0, 0, 60},
+               {11300, 658, 329, 900, 0, 0, 50},     {11300, 658, 329, 900, 0, 100, 50},
+               {11300, 658, 329, 500, 50000, 100, 0}};
+    for (unsigned n = 0; n < ROWS(row); n++) {
+        thermal_model_parameters_t now = parameters;
+        now.loss_fan_uw_per_k = row[n].loss_uw;
+        now.orthogonal_fan_uw_per_k = row[n].orthogonal_uw;
+        now.diagonal_fan_uw_per_k = row[n].diagonal_uw;
+        now.fan_half_share_permille = row[n].half_permille;
+        now.plate_coupling_uw_per_k = row[n].plate_uw;
+        now.plate_heat_capacity_mj_per_k = 2000000;
+        now.plate_loss_uw_per_k = 65535;
+        float twin_c[60];
+        for (int twin = 1; twin >= 0; twin--) {
+            setUp();
+            thermal_model_set_fan(&model, row[n].before_percent);
+            for (int m = 0; m < 60; m++) {
+                for (int turn = 0; turn < 10; turn++) {
+                    for (uint8_t k = 0; k < 9; k++) {
+                        temperature_ceiling_step(&ceiling, &model, k, k == 4 ? 0.6f : 0.0f);
+                    }
+                }
+                if (m == 10 && !twin) {
+                    declare_model(&now);
+                }
+                if (m == 11) {
+                    thermal_model_set_fan(&model, row[n].then_percent);
+                }
+                if (twin) {
+                    twin_c[m] = temperature_ceiling_c(&ceiling, 4);
+                }
+                TEST_ASSERT_TRUE(temperature_ceiling_c(&ceiling, 4) > twin_c[m] - 3.0f);
+            }
+        }
+        declare_model(&parameters);
+        TEST_ASSERT_UINT16_WITHIN(66, WHOLE, ceiling.loss_share[4]);
     }
 }
 
