@@ -15,6 +15,7 @@
 #include "ntc.h"
 #include "settings.h"
 #include "telemetry.h"
+#include "warm_mark.h"
 #ifdef NINESPRING_HIL
 #include "current_sensor_hil.h"
 #endif
@@ -133,6 +134,9 @@ static void keep_model(void)
 static void start_model(uint8_t cause)
 {
     if (!(cause & BOARD_RESET_WARM) || kept.crc != crc_of_kept()) {
+        if (warm_mark_is_set(&eeprom, SETTINGS_WARM_BASE)) {
+            controller_doubt_cold(&controller);
+        }
         return;
     }
     if (kept.known) {
@@ -296,6 +300,8 @@ OWN_FRAME static void each_second(void)
     status.load_percent = idle_us >= 1000000ul ? 0u : (uint8_t)(100u - idle_us / 10000u);
     status.stack_unused_bytes = board_stack_unused();
     learnt_store_second(&learnt, &controller);
+    warm_mark_second(&eeprom, SETTINGS_WARM_BASE, controller_may_be_warm(&controller),
+                     now_ms / 1000u);
 }
 
 OWN_FRAME static void start(void)

@@ -159,6 +159,13 @@ events cuts_in_save(kind what)
     return all;
 }
 
+/* Back at once, and then its user waits, who takes the springs for cold. The quiet time begins as
+ * it is said: what is cut is what heats or holds so much earlier, with --later that time. */
+events cut_and_called_cold(double waits_s)
+{
+    return {at(-waits_s, kind::power), say(0.0, "model cold"), say(0.2, "pattern 111101111")};
+}
+
 /* Its start takes 0.3 s: a cut in each phase of it. */
 events cuts_in_the_start(kind what)
 {
@@ -374,6 +381,10 @@ std::vector<injected> catalogue()
         {"cold declared after another size",
          {say(0, "off all"), say(0.1, "$rows=1"), say(1.5, "$rows=3"), say(1.7, "model cold")}},
         {"air of -40 degC declared", {say(0, "ambient -40")}},
+        {"power cut, cold declared after 1 s", cut_and_called_cold(1.0)},
+        {"power cut, cold declared after 5 s", cut_and_called_cold(5.0)},
+        {"power cut, cold declared after 60 s", cut_and_called_cold(60.0)},
+        {"power cut, cold declared after 120 s", cut_and_called_cold(120.0)},
         {"losses by the fan x 3.4 declared, then the fan",
          {say(0, "$loss_fan_w_per_k=0.0384"), say(0.5, "fan 100")}},
         {"losses by the fan x 5.8 declared, then the fan",

@@ -158,8 +158,8 @@ static void add_reason(text_line_t *line, const controller_t *controller, uint8_
     }
 }
 
-/* "[spring 2 was heated 12 s ago: 88 degC or more]": what the hint `model cold` does not take away.
- */
+/* "[spring 2 was heated 12 s ago: 88 degC or more]", "[spring 2 may still be hot from before
+ * power-on: wait 71 s]": what the hint `model cold` does not take away. */
 bool console_warm_line(const console_t *console, console_out_t *out)
 {
     const controller_t *const controller = console->controller;
@@ -177,6 +177,11 @@ bool console_warm_line(const console_t *console, console_out_t *out)
                             : FLASH_TEXT("[spring #0 was heated #0 s ago"),
                         values);
         text_add_values(&out->line, FLASH_TEXT(": #0 degC or more]"), &warm_c);
+    } else if (controller_is_doubtful(controller, k)) {
+        const int32_t values[] = {k + 1, rounded(controller_cooling_s(controller, k) + 0.5f)};
+        text_add_values(&out->line,
+                        FLASH_TEXT("[spring #0 may still be hot from before power-on: wait #0 s]"),
+                        values);
     }
     return true;
 }

@@ -725,7 +725,7 @@ void controller_unlock(controller_t *controller)
 static bool any_is_warm(const controller_t *controller)
 {
     for (uint8_t k = 0; k < controller->springs; k++) {
-        if (controller_is_warm(controller, k)) {
+        if (controller_is_warm(controller, k) || controller_is_doubtful(controller, k)) {
             return true;
         }
     }
@@ -782,15 +782,33 @@ void controller_set_temperature(controller_t *controller, int16_t temperature_c7
         thermal_model_reset(&controller->model, temperature_c7);
         thermal_model_set_ambient(&controller->model, temperature_c7); /* told with it, or before */
     }
+    bool guesses = false; /* of a spring that is in doubt: no heat that was given */
     for (uint8_t k = 0; k < controller->springs; k++) {
-        if (controller_is_warm(controller, k)) {
+        const bool in_doubt = controller_is_doubtful(controller, k);
+        guesses = guesses || in_doubt;
+        if (in_doubt || controller_is_warm(controller, k)) {
             continue;
         }
         cool_to(&controller->model, k, temperature_c7);
         spring_estimator_trust_spring(&controller->estimator, &controller->model, k);
     }
-    temperature_ceiling_raise(&controller->ceiling, &controller->model);
+    if (!guesses) {
+        temperature_ceiling_raise(&controller->ceiling, &controller->model);
+    }
     tell_resistances(controller);
+}
+
+void controller_doubt_cold(controller_t *controller)
+{
+    controller->ceiling.doubtful = true;
+}
+
+bool controller_may_be_warm(controller_t *controller)
+{
+    if (controller->ceiling.doubtful && controller_is_known(controller)) {
+        controller->ceiling.doubtful = false;
+    }
+    return controller->ceiling.delivered || controller->ceiling.doubtful;
 }
 
 spring_learnt_t controller_learnt(const controller_t *controller, uint8_t spring)

@@ -203,6 +203,13 @@ void controller_set_delivered(controller_t *controller, const temperature_ceilin
  * that is warm by that keeps its temperature and all that is believed of it, and then air and plate
  * keep theirs. */
 void controller_set_temperature(controller_t *controller, int16_t temperature_c7);
+/* After power-on: the board was switched off before all that it had heated was cold. Until each
+ * spring has waited as long as it may be hot (controller_cooling_s), that hint is none of it. */
+void controller_doubt_cold(controller_t *controller);
+bool controller_is_doubtful(const controller_t *controller, uint8_t spring);
+/* Once a second. False if all springs would be cold, were the power cut now: none was given heat
+ * that has not cooled, and none is in doubt. */
+bool controller_may_be_warm(controller_t *controller);
 /* By the heat that this board gave since power-on, measured, and the declared losses
  * (temperature_ceiling): too warm for the hint; how warm, degC, if it was cold before; since when
  * it was given none itself, s, TEMPERATURE_CEILING_NEVER where it never was. */

@@ -7,6 +7,11 @@ bool controller_is_warm(const controller_t *controller, uint8_t spring)
     return temperature_ceiling_is_warm(&controller->ceiling, spring);
 }
 
+bool controller_is_doubtful(const controller_t *controller, uint8_t spring)
+{
+    return controller->ceiling.doubtful && controller_cooling_s(controller, spring) > 0.0f;
+}
+
 float controller_delivered_c(const controller_t *controller, uint8_t spring)
 {
     return temperature_ceiling_c(&controller->ceiling, spring);

@@ -60,6 +60,8 @@ settings_result_t settings_assign(settings_t *settings, const char *name, const 
 #endif
 /* Behind the settings lies what has been learnt of each spring (learnt_store). */
 #define SETTINGS_LEARNT_BASE (SETTINGS_BASE + 2u * SETTINGS_SLOT_BYTES)
+/* And behind that, whether springs may be warm (warm_mark). */
+#define SETTINGS_WARM_BASE (SETTINGS_LEARNT_BASE + 2u * SETTINGS_LEARNT_SLOT_BYTES)
 
 /* What became of the stored record. Where found is none of RECORD_LOADED..., all are defaults. */
 typedef struct {

@@ -96,6 +96,7 @@ void temperature_ceiling_begin(temperature_ceiling_t *ceiling, int16_t ambient_c
     }
     set_ambient(ceiling, ambient_c7);
     ceiling->delivered = false;
+    ceiling->doubtful = false;
     ceiling->broken_seals = 0;
 }
 

@@ -34,7 +34,8 @@ typedef struct {
     uint16_t seal[THERMAL_MODEL_MAX_SPRINGS];       /* checksum of all that, of this spring */
     int16_t ambient_c7;     /* the highest that was told since the springs were cold */
     int16_t not_ambient_c7; /* its complement */
-    bool delivered;         /* power was given since then */
+    bool delivered : 1;     /* power was given since then */
+    bool doubtful : 1;      /* before power-on it was, and nobody has waited since */
     uint8_t broken_seals;   /* found so far, saturating */
 } temperature_ceiling_t;
 

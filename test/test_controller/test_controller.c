@@ -289,6 +289,38 @@ TEST(ceiling_trips_whatever_is_believed)
     }
 }
 
+/* Nor is a spring called cold that was warm as the power was cut, until it has waited; what is
+ * guessed of it meanwhile is no heat that was given. */
+TEST(what_was_warm_as_the_power_was_cut_is_called_cold_by_nobody)
+{
+    thermal_model_state_t state;
+    controller_settings_default(&settings);
+    start();
+    controller_get_model_state(&controller, &state);
+    TEST_ASSERT_FALSE(controller_may_be_warm(&controller));
+    TEST_ASSERT_FALSE(controller_is_doubtful(&controller, 4));
+    controller_doubt_cold(&controller);
+    for (int s = 0; s < 60; s++) {
+        const float wait_s = controller_cooling_s(&controller, 4);
+        TEST_ASSERT_TRUE(wait_s > 0.0f);
+        controller_set_temperature(&controller, AMBIENT_C7);
+        TEST_ASSERT_EQUAL_FLOAT(wait_s, controller_cooling_s(&controller, 4));
+        TEST_ASSERT_TRUE(controller_is_doubtful(&controller, 4));
+        TEST_ASSERT_FALSE(controller_is_warm(&controller, 4));
+        TEST_ASSERT_FALSE(controller_set_model_state(&controller, &state));
+        TEST_ASSERT_TRUE(controller_may_be_warm(&controller));
+        run(50u);
+    }
+    run(50u * 40u);
+    TEST_ASSERT_FALSE(controller_is_doubtful(&controller, 4));
+    TEST_ASSERT_FALSE(controller_may_be_warm(&controller));
+    controller_set_temperature(&controller, AMBIENT_C7);
+    TEST_ASSERT_EQUAL_INT16(AMBIENT_C7, controller_temperature_c7(&controller, 4));
+    settings.model.rows = 1; /* another size is waited for anew, but no longer in doubt */
+    TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+    TEST_ASSERT_FALSE(controller_is_doubtful(&controller, 1));
+}
+
 /* All that can be said of a spring which this board has heated: none of it takes a kelvin away. */
 TEST(no_hint_takes_heat_that_was_given)
 {
