@@ -33,9 +33,7 @@ void setUp(void)
     busy = false;
 }
 
-void tearDown(void)
-{
-}
+void tearDown(void) {}
 
 /* A minute of each. */
 static void minute(bool warm, uint32_t from_s)
