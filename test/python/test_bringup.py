@@ -152,7 +152,9 @@ def test_from_nothing_to_nine_springs(bench: Make, tmp_path: Path) -> None:
         ("All springs", ["thermistor"]),
     ]
     done = converse(made.board, page, hands, heard.append)
-    assert left == [] and all(one.passed for one in done.values()), [one.found for one in done.values()]
+    assert left == [] and all(one.passed for one in done.values()), [
+        (n, one.passed, one.found) for n, one in done.items() if not one.passed
+    ]
     assert list(done) == list(bringup.STEPS)
     kept = json.loads(page.with_suffix(".json").read_text())
     assert kept["schema"] == "ninespring.bringup/1" and len(kept["steps"]) == 7
