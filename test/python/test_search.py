@@ -496,9 +496,9 @@ def test_a_run_that_does_not_begin_as_logged_is_said(make_log) -> None:
         for k in range(1, 10):
             columns[f"t{k}_c"] = columns[f"t{k}_c"] + 6.0 * np.exp(-((np.arange(600.0) - 30) ** 2) / 200)
 
-    left = searched(read_log(make_log(change=late)))
-    names, _ = residual.depends_on(left.problem, left.base)
-    assert any("the start of run 1" in text for text in names)
+    result = diagnosis.diagnose(Array(), [read_log(make_log(change=late))]).result
+    assert result["unexplained"] is True
+    assert any("the start of run 1" in text for text in result["residual"]["depends_on"])
 
 
 def test_correlations_of_the_rest_are_correlations(make_log) -> None:

@@ -388,6 +388,7 @@ TEST(no_hint_takes_heat_that_was_given)
             TEST_ASSERT_TRUE(controller_apply_settings(&controller, &other, NULL));
             break;
         }
+        controller_set_temperature(&controller, AMBIENT_C7); /* `model cold` */
         TEST_ASSERT_TRUE(controller_is_warm(&controller, 4));
         TEST_ASSERT_TRUE(controller_delivered_c(&controller, 4) > given_c - 8.0f);
         if (model_stays) {
