@@ -201,20 +201,16 @@ static uint32_t couplings_uw_per_k(const thermal_model_t *model, uint8_t k)
     return sum_uw_per_k;
 }
 
-/* How many neighbours there are one row or column away, and both. */
 static temperature_ceiling_fan_t with_fan(const thermal_model_t *model, uint8_t k,
                                           uint16_t loss_uw_per_k, uint16_t orthogonal_uw_per_k,
                                           uint16_t diagonal_uw_per_k)
 {
-    const thermal_model_spring_t *const spring = &model->spring[k];
-    const thermal_model_parameters_t *const p = &model->parameters;
-    const uint8_t vertical = (uint8_t)((spring->row > 0) + (spring->row + 1 < p->rows));
-    const uint8_t horizontal = (uint8_t)((spring->column > 0) + (spring->column + 1 < p->columns));
-    return (temperature_ceiling_fan_t){
-        .loss_uw_per_k = loss_uw_per_k,
-        /* conductances fit 16 bits, or the model has refused them */
-        .neighbours_uw_per_k = (uint16_t)((uint8_t)(vertical + horizontal) * orthogonal_uw_per_k +
-                                          (uint8_t)(vertical * horizontal) * diagonal_uw_per_k)};
+    const thermal_model_neighbours_t neighbours = thermal_model_neighbours(&model->parameters, k);
+    return (temperature_ceiling_fan_t){.loss_uw_per_k = loss_uw_per_k,
+                                       /* conductances fit 16 bits, or the model has refused them */
+                                       .neighbours_uw_per_k =
+                                           (uint16_t)(neighbours.orthogonals * orthogonal_uw_per_k +
+                                                      neighbours.diagonals * diagonal_uw_per_k)};
 }
 
 temperature_ceiling_declared_t temperature_ceiling_declared(const thermal_model_t *model, uint8_t k)
@@ -229,9 +225,9 @@ temperature_ceiling_declared_t temperature_ceiling_declared(const thermal_model_
         1e-6f / (float)(HOT_C - COOL_C) * (float)more_uw - plate_w_per_k - neighbours_w_per_k;
     const float capacity = capacity_j_per_k(model, k);
     return (temperature_ceiling_declared_t){
-        .loss_w_per_k = loss_w_per_k,
-        .with_plate_w_per_k = loss_w_per_k + plate_w_per_k,
-        .with_neighbours_w_per_k = loss_w_per_k + neighbours_w_per_k,
+        .now = {.own_w_per_k = loss_w_per_k,
+                .with_plate_w_per_k = loss_w_per_k + plate_w_per_k,
+                .with_neighbours_w_per_k = loss_w_per_k + neighbours_w_per_k},
         .capacity_j_per_k = capacity,
         .heat_j = capacity *
                   (TEMPERATURE_CEILING_HEATED_K + (float)model->latent_full_c8 * (1.0f / 256.0f)),
@@ -272,40 +268,29 @@ static uint16_t share_of(uint16_t share, float kept)
 }
 
 /* At a fan between still and blown. */
-typedef struct {
-    float loss_w_per_k;
-    float with_plate_w_per_k;
-    float with_neighbours_w_per_k;
-} losses_t;
-
-static losses_t losses_at(const temperature_ceiling_declared_t *d, float fan)
+static temperature_ceiling_losses_t losses_at(const temperature_ceiling_declared_t *d, float fan)
 {
     const float loss_w_per_k = 1e-6f * ((1.0f - fan) * (float)d->still.loss_uw_per_k +
                                         fan * (float)d->blown.loss_uw_per_k);
-    return (losses_t){
-        .loss_w_per_k = loss_w_per_k,
-        .with_plate_w_per_k = loss_w_per_k + (d->with_plate_w_per_k - d->loss_w_per_k),
+    return (temperature_ceiling_losses_t){
+        .own_w_per_k = loss_w_per_k,
+        .with_plate_w_per_k = loss_w_per_k + (d->now.with_plate_w_per_k - d->now.own_w_per_k),
         .with_neighbours_w_per_k =
             loss_w_per_k + 1e-6f * ((1.0f - fan) * (float)d->still.neighbours_uw_per_k +
                                     fan * (float)d->blown.neighbours_uw_per_k)};
 }
 
-static float change_at(losses_t before, losses_t now)
+static float change_at(temperature_ceiling_losses_t before, temperature_ceiling_losses_t now)
 {
-    const float loss = change(before.loss_w_per_k, now.loss_w_per_k);
+    const float loss = change(before.own_w_per_k, now.own_w_per_k);
     const float plate = change(before.with_plate_w_per_k, now.with_plate_w_per_k);
     const float neighbours = change(before.with_neighbours_w_per_k, now.with_neighbours_w_per_k);
     return larger(larger(loss, plate), neighbours);
 }
 
-static losses_t losses_now(const temperature_ceiling_declared_t *d)
+static bool is_alike(temperature_ceiling_losses_t a, temperature_ceiling_losses_t b)
 {
-    return (losses_t){d->loss_w_per_k, d->with_plate_w_per_k, d->with_neighbours_w_per_k};
-}
-
-static bool is_alike(losses_t a, losses_t b)
-{
-    return a.loss_w_per_k == b.loss_w_per_k && a.with_plate_w_per_k == b.with_plate_w_per_k &&
+    return a.own_w_per_k == b.own_w_per_k && a.with_plate_w_per_k == b.with_plate_w_per_k &&
            a.with_neighbours_w_per_k == b.with_neighbours_w_per_k;
 }
 
@@ -316,14 +301,16 @@ static float loss_change(const temperature_ceiling_declared_t *before,
                          const temperature_ceiling_declared_t *now, uint8_t fan_percent)
 {
     const bool other_half = before->half_share != now->half_share;
-    float most = change_at(losses_now(before), losses_now(now));
+    float most = change_at(before->now, now->now);
     for (uint8_t percent = 0; percent <= 100; percent = (uint8_t)(percent + 50)) {
         if (percent == fan_percent || (percent == 50 && !other_half)) {
             continue;
         }
         const float fan = 0.01f * (float)percent;
-        const losses_t was = losses_at(before, percent == 50 ? before->half_share : fan);
-        const losses_t is = losses_at(now, percent == 50 ? now->half_share : fan);
+        const temperature_ceiling_losses_t was =
+            losses_at(before, percent == 50 ? before->half_share : fan);
+        const temperature_ceiling_losses_t is =
+            losses_at(now, percent == 50 ? now->half_share : fan);
         if (!is_alike(was, is)) {
             most = larger(most, change_at(was, is));
         }

@@ -62,12 +62,16 @@ typedef struct {
     uint16_t neighbours_uw_per_k; /* what joins it with them */
 } temperature_ceiling_fan_t;
 
-/* What a model declares of a spring, wherever it and its neighbours are. */
+/* What a spring loses per kelvin at one fan. */
 typedef struct {
-    float loss_w_per_k; /* to the air at the present fan: what flows to neighbours and plate stays
-                           in the array */
+    float own_w_per_k; /* to the air: what flows to neighbours and plate stays in the array */
     float with_plate_w_per_k;
     float with_neighbours_w_per_k; /* the loss and what joins it with them */
+} temperature_ceiling_losses_t;
+
+/* What a model declares of a spring, wherever it and its neighbours are. */
+typedef struct {
+    temperature_ceiling_losses_t now; /* at the present fan */
     float capacity_j_per_k;
     float heat_j; /* that warms it by TEMPERATURE_CEILING_HEATED_K and transforms it */
     temperature_ceiling_fan_t still;

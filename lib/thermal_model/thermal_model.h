@@ -191,6 +191,14 @@ uint32_t thermal_model_heating_uw(const thermal_model_t *model, spring_index_t s
 thermal_model_transformation_t thermal_model_transformation(const thermal_model_t *model,
                                                             spring_index_t spring);
 int16_t thermal_model_ambient_c7(const thermal_model_t *model);
+/* How many neighbours a spring has one row or column away, and both. */
+typedef struct {
+    uint8_t orthogonals;
+    uint8_t diagonals;
+} thermal_model_neighbours_t;
+thermal_model_neighbours_t thermal_model_neighbours(const thermal_model_parameters_t *parameters,
+                                                    spring_index_t spring);
+
 /* Between two springs at the present fan; 0 where they are no neighbours. Both below the number of
  * springs. O(1). */
 uint16_t thermal_model_coupling_uw_per_k(const thermal_model_t *model, spring_index_t spring,

@@ -16,22 +16,15 @@ static uint32_t larger(uint32_t a, uint32_t b)
     return a > b ? a : b;
 }
 
-typedef struct {
-    uint8_t row;
-    uint8_t column;
-    uint8_t orthogonals; /* neighbours */
-    uint8_t diagonals;
-} place_t;
-
-static place_t place_of(const thermal_model_parameters_t *p, spring_index_t spring)
+thermal_model_neighbours_t thermal_model_neighbours(const thermal_model_parameters_t *p,
+                                                    spring_index_t spring)
 {
-    place_t place = {.row = (uint8_t)(spring / p->columns),
-                     .column = (uint8_t)(spring % p->columns)};
-    const uint8_t vertical = (uint8_t)((place.row > 0) + (place.row + 1 < p->rows));
-    const uint8_t horizontal = (uint8_t)((place.column > 0) + (place.column + 1 < p->columns));
-    place.diagonals = (uint8_t)(vertical * horizontal);
-    place.orthogonals = (uint8_t)(vertical + horizontal);
-    return place;
+    const uint8_t row = (uint8_t)(spring / p->columns);
+    const uint8_t column = (uint8_t)(spring % p->columns);
+    const uint8_t vertical = (uint8_t)((row > 0) + (row + 1 < p->rows));
+    const uint8_t horizontal = (uint8_t)((column > 0) + (column + 1 < p->columns));
+    return (thermal_model_neighbours_t){.orthogonals = (uint8_t)(vertical + horizontal),
+                                        .diagonals = (uint8_t)(vertical * horizontal)};
 }
 
 /* Radiation's slope at the highest temperature (488 K), uW/K: 4 sigma T^3 = 26.4 W/m2K. */
@@ -65,11 +58,11 @@ thermal_model_refusal_t thermal_model_check_flows(const thermal_model_parameters
     if (rise_e6 > LOSS_RISE_MAX_E6 || risen > CONDUCTANCE_MAX) {
         REFUSE(OVERFLOW, loss_rise_per_k);
     }
-    const place_t place = place_of(p, i);
+    const thermal_model_neighbours_t neighbours = thermal_model_neighbours(p, i);
     const uint32_t orthogonal =
-        place.orthogonals * larger(p->orthogonal_uw_per_k, p->orthogonal_fan_uw_per_k);
+        neighbours.orthogonals * larger(p->orthogonal_uw_per_k, p->orthogonal_fan_uw_per_k);
     const uint32_t diagonal =
-        place.diagonals * larger(p->diagonal_uw_per_k, p->diagonal_fan_uw_per_k);
+        neighbours.diagonals * larger(p->diagonal_uw_per_k, p->diagonal_fan_uw_per_k);
     const uint32_t conduction = orthogonal + diagonal + p->plate_coupling_uw_per_k;
     const uint32_t loss = larger(risen, forced + 1u);
     const uint32_t total = loss + conduction + p->wake_uw_per_k + radiation_slope(p);

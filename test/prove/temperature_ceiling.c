@@ -18,8 +18,6 @@ static void any_model(thermal_model_t *model)
         model->spring[k].loss_uw_per_k = any_u16();
         model->spring[k].loss_natural_uw_per_k = any_u16();
         model->spring[k].loss_fan_uw_per_k = any_u16();
-        model->spring[k].row = any_u8();
-        model->spring[k].column = any_u8();
     }
 }
 

@@ -314,7 +314,8 @@ TEST(many_small_declarations_escape_no_more_than_one_large_one)
             declare(1.0f + step[n][0] * (float)m, 1.0f + step[n][1] * (float)m);
         }
         const temperature_ceiling_declared_t now = temperature_ceiling_declared(&model, 4);
-        const float loss = now.loss_w_per_k / least.loss_w_per_k * (float)ceiling.loss_share[4];
+        const float loss =
+            now.now.own_w_per_k / least.now.own_w_per_k * (float)ceiling.loss_share[4];
         const float heat =
             now.capacity_j_per_k / least.capacity_j_per_k * (float)ceiling.capacity_share[4];
         TEST_ASSERT_FLOAT_WITHIN(0.01f, 0.99f, loss / (float)WHOLE);
@@ -353,7 +354,7 @@ TEST(what_flows_to_neighbours_and_plate_is_no_declared_loss)
     TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &parameters, NULL));
     for (int warm = 0; warm < 2; warm++) { /* wherever its neighbours are */
         const temperature_ceiling_declared_t declared = temperature_ceiling_declared(&model, 4);
-        TEST_ASSERT_FLOAT_WITHIN(2e-6f, 0.0058f, declared.loss_w_per_k);
+        TEST_ASSERT_FLOAT_WITHIN(2e-6f, 0.0058f, declared.now.own_w_per_k);
         for (uint8_t k = 0; k < 9; k++) {
             thermal_model_set_temperature(&model, k, 90 * 128);
         }

@@ -40,6 +40,14 @@ uint16_t thermal_model_coupling_uw_per_k(const thermal_model_t *model, spring_in
     return any_u16();
 }
 
+thermal_model_neighbours_t thermal_model_neighbours(const thermal_model_parameters_t *p,
+                                                    spring_index_t spring)
+{
+    (void)p;
+    (void)spring;
+    return (thermal_model_neighbours_t){(uint8_t)any_between(0, 4), (uint8_t)any_between(0, 4)};
+}
+
 int32_t thermal_model_power_to_hold_uw(const thermal_model_t *model, spring_index_t spring,
                                        int16_t temperature_c7)
 {
