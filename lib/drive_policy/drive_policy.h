@@ -65,8 +65,10 @@ typedef struct {
     uint16_t derated_turns; /* fully, on end */
     spring_away_t away;     /* since it was asked for */
     uint8_t stage;          /* drive_policy_stage_t */
+    uint8_t asked;          /* its level, in steps of 4 permille */
     bool released : 1;      /* switched off hot: no false actuation */
     bool tripped : 1;
+    bool partly : 1; /* its stage began at a level of the phase */
 } drive_policy_spring_t;
 
 typedef struct {

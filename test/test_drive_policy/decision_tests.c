@@ -63,6 +63,7 @@ static void begin(uint8_t rows, uint8_t columns)
 static void stands(uint8_t k, drive_policy_stage_t stage, uint16_t permille)
 {
     level[k] = permille;
+    policy.spring[k].asked = (uint8_t)(permille / 4u); /* for some time */
     policy.spring[k].stage = (uint8_t)stage;
     policy.spring[k].rise_k_per_s = 4.0f;
     policy.spring[k].ceiling_ma = parameters.boost_current_ma;
@@ -400,6 +401,60 @@ TEST(way_down_ends_at_its_level)
         if (table[n].stage == HEAT) {
             TEST_ASSERT_FLOAT_WITHIN(0.01f, 4.0f, s->rise_k_per_s);
         }
+    }
+}
+
+/* A heating from a level to full: from half of the phase on the middle of the wire has its own, and
+ * what heats beyond the hold is 0.15 W. Not from off, nor where a fifth or less is missing. */
+TEST(heating_from_a_level_to_full_slows_at_half)
+{
+    static const struct {
+        drive_policy_stage_t from;
+        float began, phase, c;
+        bool slows;
+    } table[] = {{HOLD, 0.15f, 0.51f, 87.1f, true},  {LOWER, 0.15f, 0.51f, 87.1f, true},
+                 {HOLD, 0.15f, 0.49f, 87.1f, false}, {HOLD, 0.15f, 0.51f, 86.9f, false},
+                 {HOLD, 0.101f, 0.51f, 87.1f, true}, {HOLD, 0.099f, 0.51f, 87.1f, false},
+                 {HOLD, 0.799f, 0.85f, 87.1f, true}, {HOLD, 0.801f, 0.85f, 87.1f, false},
+                 {OFF, 0.15f, 0.51f, 87.1f, false}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin(1, 2);
+        believed(0, 80.0f, B, table[n].began);
+        stands(0, table[n].from, 1000);
+        turn_of(0);
+        row(n);
+        TEST_ASSERT_EQUAL(HEAT, drive_policy_stage(&policy, 0));
+        believed(0, table[n].c, B, table[n].phase);
+        policy.spring[0].granted_ma = BOOST_MA;
+        turn_of(0);
+        const int asks_ma = table[n].slows ? ma_of(GIVES_W + 0.15f) : BOOST_MA;
+        TEST_ASSERT_INT_WITHIN(1, asks_ma, policy.spring[0].wanted_ma);
+    }
+}
+
+/* What was tried for one level is not held against another; one that is asked for fully on its way
+ * down is heated whatever was tried. */
+TEST(another_level_is_tried_anew)
+{
+    static const struct {
+        drive_policy_stage_t from;
+        uint16_t before, now;
+        float phase;
+        drive_policy_stage_t stage;
+    } table[] = {{HOLD, 500, 500, 0.2f, HOLD},   {HOLD, 500, 504, 0.2f, HEAT},
+                 {HOLD, 150, 1000, 0.2f, HEAT},  {HOLD, 1000, 500, 0.2f, HEAT},
+                 {LOWER, 500, 500, 0.2f, HOLD},  {LOWER, 150, 1000, 0.2f, HEAT},
+                 {LOWER, 1000, 1000, 0.2f, HEAT}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin(1, 2);
+        believed(0, 80.0f, B, table[n].phase);
+        stands(0, table[n].from, table[n].before);
+        policy.spring[0].away = (spring_away_t){10, 9000}; /* no try is left */
+        level[0] = table[n].now;
+        turn_of(0);
+        row(n);
+        TEST_ASSERT_EQUAL(table[n].stage, drive_policy_stage(&policy, 0));
+        TEST_ASSERT_EQUAL_UINT16(11, policy.spring[0].away.turns);
     }
 }
 

@@ -615,3 +615,40 @@ TEST(a_supply_that_is_found_in_mid_drive_is_no_fault)
         TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, result.losses.spring[k].fault);
     }
 }
+
+/* Of all springs, in a world that is as declared: how hot a part of one gets until then. */
+static double hottest_c_until(double until_s)
+{
+    double hottest_c = -300.0;
+    while (world_time_s(world) < until_s) {
+        world_tick(world, &outputs, &inputs);
+        controller_tick(&controller, &inputs, &outputs);
+        for (int k = 0; k < world_springs(world); k++) {
+            hottest_c = fmax(hottest_c, world_hottest_c(world, k));
+        }
+    }
+    return hottest_c;
+}
+
+static void ask_for(uint16_t permille)
+{
+    for (uint8_t k = 0; k < 9; k++) {
+        TEST_ASSERT_TRUE(controller_set_target(&controller, k, k == 4 ? 0 : permille));
+    }
+}
+
+/* From 60 to 15 % the crimped ends go first: the middle of each wire has what is left, and is
+ * heated by all that the ends still take up. */
+TEST(levels_that_are_raised_to_full_leave_no_part_too_hot_and_all_of_them_on)
+{
+    ask_for(600);
+    (void)hottest_c_until(205.0);
+    ask_for(150);
+    (void)hottest_c_until(385.0);
+    ask_for(1000);
+    const double hottest_c = hottest_c_until(560.0);
+    TEST_ASSERT_TRUE(hottest_c < 120.0);
+    for (int k = 0; k < 9; k++) {
+        TEST_ASSERT_TRUE(k == 4 || world_austenite(world, k) > 0.95);
+    }
+}
