@@ -26,6 +26,13 @@ void row(size_t n)
     here("row %u", (unsigned)n);
 }
 
+void say_where(void)
+{
+    if (where[0] != '\0') {
+        printf("    here: %s\n", where);
+    }
+}
+
 int run_tests(void)
 {
     UnityBegin(__FILE__);
@@ -34,8 +41,8 @@ int run_tests(void)
         const UNITY_COUNTER_TYPE failures = Unity.TestFailures;
         where[0] = '\0';
         UnityDefaultTestRun(test->run, test->name, test->line);
-        if (Unity.TestFailures > failures && where[0] != '\0') {
-            printf("    here: %s\n", where);
+        if (Unity.TestFailures > failures) {
+            say_where();
         }
     }
     return UNITY_END();

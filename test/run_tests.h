@@ -37,6 +37,7 @@ int run_tests(void);
 /* What a test says beside its line where it fails: the row of its table, or whatever it is at. */
 void row(size_t n);
 void here(const char *format, ...) __attribute__((format(printf, 1, 2)));
+void say_where(void); /* it is said: the line of a test that failed */
 
 #define ROWS(table) (sizeof(table) / sizeof *(table))
 

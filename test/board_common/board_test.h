@@ -12,6 +12,7 @@
 #include <initializer_list>
 #include <memory>
 #include <string>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "../run_tests.h"
@@ -49,6 +50,29 @@ inline bool contains(const std::string &text, const std::string &part)
 inline void expect_in(const std::string &text, const std::string &part)
 {
     TEST_ASSERT_TRUE_MESSAGE(contains(text, part), text.c_str());
+}
+
+/* Tries it in a copy of this process, with boards as they stand here: what leads here is run once
+ * for all that is tried from here, and nothing of it is left behind. */
+template <typename Tried> void try_from_here(const Tried &tried)
+{
+    (void)std::fflush(nullptr);
+    const pid_t copy = fork();
+    TEST_ASSERT_TRUE(copy >= 0);
+    if (copy == 0) {
+        if (TEST_PROTECT()) {
+            tried();
+        }
+        if (Unity.CurrentTestFailed != 0) {
+            std::printf("\n");
+            say_where();
+        }
+        (void)std::fflush(nullptr);
+        _exit(Unity.CurrentTestFailed != 0 ? 1 : 0);
+    }
+    int status = -1;
+    TEST_ASSERT_EQUAL_INT(copy, waitpid(copy, &status, 0));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, status, "it failed in the copy");
 }
 
 inline void switch_on(plant_t *plant, const char *effect)

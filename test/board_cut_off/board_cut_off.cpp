@@ -48,18 +48,11 @@ double off_after_ms(rig &mega, const char *what, double limit_ms)
 
 TEST(a_welded_switch_heats_until_the_supply_is_off)
 {
-    for (const bool driven : {true, false}) {
-        rig mega;
-        heat(mega);
-        if (!driven) {
-            mega.expect_ok("off 5");
-            mega.run_ms(200.0);
-        }
+    rig mega;
+    heat(mega);
+    const auto closes = [&mega](const char *what) {
         board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, true);
-        off_after_ms(mega,
-                     driven ? "switch of a driven spring closed"
-                            : "switch of a spring that is off closed",
-                     LIMIT_MS);
+        off_after_ms(mega, what, LIMIT_MS);
         TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_STUCK_ON, mega.view().board_fault);
         TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_STUCK_ON, mega.view().spring[4].fault);
         const std::string faults = mega.say("faults");
@@ -91,67 +84,77 @@ TEST(a_welded_switch_heats_until_the_supply_is_off)
         mega.run_ms(300.0);
         TEST_ASSERT_TRUE(board_current_a(mega.raw(), 0) > 0.1);
         TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, mega.view().spring[0].fault);
-    }
+    };
+    try_from_here([&] { closes("switch of a driven spring closed"); });
+    mega.expect_ok("off 5");
+    mega.run_ms(200.0);
+    closes("switch of a spring that is off closed");
 }
 
 /* A line that takes longer than a tick costs pulses: not so many that the relay opens and the
  * current loops take nothing for a reading, whenever in a tick it comes. */
 TEST(a_setting_in_mid_drive_opens_no_relay)
 {
-    for (const char *line : {"$martensite_start_c=76\n", "$loss_w_per_k=0.0064\n",
-                             "$latent_heat_j=9\n", "$supply_v=5.1\n", "$hold_margin_k=3\n",
-                             "$latent_heat_j=9\n$loss_scale_1=1.1\n$martensite_start_c=77\n"}) {
-        for (double at_ms = 0.0; at_ms < 20.0; at_ms += 5.0) {
-            rig mega;
-            mega.boot_niti({"on all"});
-            mega.run_ms(1000.0 + at_ms);
-            board_send(mega.raw(), line, std::strlen(line));
-            for (int ms = 0; ms < 200; ++ms) {
-                (void)board_run_ms(mega.raw(), 1.0);
-                TEST_ASSERT_TRUE_MESSAGE(board_is_fed(mega.raw()), line);
-                TEST_ASSERT_TRUE_MESSAGE(board_current_a(mega.raw(), 4) > 1.0, line);
-            }
-            mega.expect_says("faults", "ok");
+    rig mega;
+    mega.boot_niti({"on all"});
+    mega.run_ms(1000.0);
+    for (double at_ms = 0.0; at_ms < 20.0; at_ms += 5.0) {
+        for (const char *line : {"$martensite_start_c=76\n", "$loss_w_per_k=0.0064\n",
+                                 "$latent_heat_j=9\n", "$supply_v=5.1\n", "$hold_margin_k=3\n",
+                                 "$latent_heat_j=9\n$loss_scale_1=1.1\n$martensite_start_c=77\n"}) {
+            try_from_here([&] {
+                board_send(mega.raw(), line, std::strlen(line));
+                for (int ms = 0; ms < 200; ++ms) {
+                    (void)board_run_ms(mega.raw(), 1.0);
+                    TEST_ASSERT_TRUE_MESSAGE(board_is_fed(mega.raw()), line);
+                    TEST_ASSERT_TRUE_MESSAGE(board_current_a(mega.raw(), 4) > 1.0, line);
+                }
+                mega.expect_says("faults", "ok");
+            });
         }
+        mega.run_ms(5.0);
     }
 }
 
 /* Whenever in a tick it fails, and however much the spring was given. */
 TEST(a_welded_switch_is_cut_at_any_moment_of_a_tick)
 {
-    double longest_ms = 0.0;
     for (const char *level : {"off 5", "on 5 30", "on 5 100"}) {
+        rig mega;
+        mega.boot_niti({level});
+        mega.run_ms(600.0);
         for (double at_ms = 0.0; at_ms < 20.0; at_ms += 3.0) {
-            rig mega;
-            mega.boot_niti({level});
-            mega.run_ms(600.0 + at_ms);
-            TEST_ASSERT_TRUE(board_is_fed(mega.raw()));
-            board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, true);
-            longest_ms = std::fmax(longest_ms, off_after_ms(mega, level, LIMIT_MS));
-            TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_STUCK_ON, mega.view().board_fault);
+            try_from_here([&] {
+                TEST_ASSERT_TRUE(board_is_fed(mega.raw()));
+                board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, true);
+                off_after_ms(mega, level, LIMIT_MS);
+                TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_STUCK_ON, mega.view().board_fault);
+            });
+            mega.run_ms(3.0);
         }
     }
-    std::printf("the longest: %.0f ms\n", longest_ms);
 }
 
 /* Nothing can be read, so nothing shows it. */
 TEST(a_switch_that_welds_while_the_bus_hangs_is_cut)
 {
+    rig mega;
+    heat(mega);
     for (const bool driven : {true, false}) {
+        if (!driven) {
+            mega.expect_ok("off all");
+            mega.run_ms(200.0);
+        }
         for (double weld_ms = 0.0; weld_ms < 100.0; weld_ms += 40.0) {
-            rig mega;
-            heat(mega);
-            if (!driven) {
-                mega.expect_ok("off all");
-                mega.run_ms(200.0);
-            }
-            const double before = hottest_c(mega);
-            board_set_fault(mega.raw(), BOARD_FAULT_SDA_LOW, 0, true);
-            mega.run_ms(weld_ms);
-            board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, true);
-            off_after_ms(mega, "switch closed, bus hangs", 2.0 * LIMIT_MS - weld_ms);
-            TEST_ASSERT_TRUE(hottest_c(mega) < before + 30.0);
-            TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NO_SENSOR, mega.view().board_fault);
+            try_from_here([&] {
+                const double before = hottest_c(mega);
+                board_set_fault(mega.raw(), BOARD_FAULT_SDA_LOW, 0, true);
+                mega.run_ms(weld_ms);
+                board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, true);
+                off_after_ms(mega, "switch closed, bus hangs", 2.0 * LIMIT_MS - weld_ms);
+                TEST_ASSERT_TRUE(hottest_c(mega) < before + 30.0);
+                TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NO_SENSOR, mega.view().board_fault);
+            });
         }
     }
 }
@@ -180,19 +183,21 @@ TEST(a_spring_that_is_plugged_in_leaves_the_supply)
 /* With a closed switch, too: nothing of the program is needed. */
 TEST(a_program_that_hangs_holds_nothing)
 {
+    rig mega;
+    heat(mega);
     for (const bool closed : {false, true}) {
-        rig mega;
-        heat(mega);
-        board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, closed);
-        board_hang(mega.raw());
-        off_after_ms(mega, closed ? "hung, a switch closed" : "hung", LIMIT_MS);
-        TEST_ASSERT_EQUAL_UINT(1, board_reset_count(mega.raw()));
-        TEST_ASSERT_TRUE(mega.view().locked);
-        board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, false);
-        mega.boot(false);
-        mega.expect_ok("unlock");
-        mega.run_ms(60.0);
-        TEST_ASSERT_TRUE(board_is_fed(mega.raw()));
+        try_from_here([&] {
+            board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, closed);
+            board_hang(mega.raw());
+            off_after_ms(mega, closed ? "hung, a switch closed" : "hung", LIMIT_MS);
+            TEST_ASSERT_EQUAL_UINT(1, board_reset_count(mega.raw()));
+            TEST_ASSERT_TRUE(mega.view().locked);
+            board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, false);
+            mega.boot(false);
+            mega.expect_ok("unlock");
+            mega.run_ms(60.0);
+            TEST_ASSERT_TRUE(board_is_fed(mega.raw()));
+        });
     }
 }
 
@@ -216,11 +221,13 @@ TEST(what_stops_its_pulses_stops_the_supply)
         {"supply off", LIMIT_MS + 25.0, [](rig &m) { m.board.send("supply off\n"); }},
         {"!!", LIMIT_MS + 25.0, [](rig &m) { m.board.send("!!"); }},
     };
+    rig mega;
+    heat(mega);
     for (const auto &end : ends) {
-        rig mega;
-        heat(mega);
-        end.happens(mega);
-        off_after_ms(mega, end.what, end.limit_ms);
+        try_from_here([&] {
+            end.happens(mega);
+            off_after_ms(mega, end.what, end.limit_ms);
+        });
     }
 }
 

@@ -47,10 +47,9 @@ void off_until_unlocked(rig &mega)
 TEST(each_reset_leaves_the_board_off_and_locked_and_keeps_what_it_may)
 {
     enum { HANG = -1 };
-    for (const int cause : {static_cast<int>(HANG), static_cast<int>(BOARD_RESET_BROWN_OUT),
-                            static_cast<int>(BOARD_RESET_EXTERNAL)}) {
-        rig mega;
-        heat(mega);
+    rig mega;
+    heat(mega);
+    const auto ends = [&mega](int cause) {
         const int before_c7 = mega.view().spring[4].temperature_c7;
         if (cause == HANG) {
             board_hang(mega.raw());
@@ -68,24 +67,28 @@ TEST(each_reset_leaves_the_board_off_and_locked_and_keeps_what_it_may)
             off_until_unlocked(mega);
         }
         TEST_ASSERT_TRUE(cause != BOARD_RESET_EXTERNAL || board_all_off(mega.raw()));
+    };
+    for (const int cause : {static_cast<int>(HANG), static_cast<int>(BOARD_RESET_BROWN_OUT),
+                            static_cast<int>(BOARD_RESET_EXTERNAL)}) {
+        try_from_here([&] { ends(cause); });
     }
 }
 
 /* Timer 2 compares, a conversion is complete, timer 1 overflows: nobody has asked for them. */
 TEST(an_interrupt_that_nobody_has_ends_as_a_hang_does)
 {
+    rig mega;
+    heat(mega);
     for (const unsigned vector : {14U, 29U, 20U}) {
-        rig mega;
-        heat(mega);
-        const unsigned before = board_reset_count(mega.raw());
-        here("vector %u", vector);
-        TEST_ASSERT_TRUE(board_raise_interrupt(mega.raw(), vector));
-        mega.run_ms(WATCHDOG_MS + 20.0);
-        TEST_ASSERT_EQUAL_UINT(before + 1, board_reset_count(mega.raw()));
-        TEST_ASSERT_TRUE(board_all_off(mega.raw()));
-        const std::string greeting = mega.boot(false);
-        expect_in(greeting, "watchdog");
-        off_until_unlocked(mega);
+        try_from_here([&] {
+            here("vector %u", vector);
+            TEST_ASSERT_TRUE(board_raise_interrupt(mega.raw(), vector));
+            mega.run_ms(WATCHDOG_MS + 20.0);
+            TEST_ASSERT_EQUAL_UINT(1, board_reset_count(mega.raw()));
+            TEST_ASSERT_TRUE(board_all_off(mega.raw()));
+            expect_in(mega.boot(false), "watchdog");
+            off_until_unlocked(mega);
+        });
     }
 }
 
@@ -142,11 +145,9 @@ TEST(a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so)
         const char *variable;
         std::uint32_t offset;
     };
-    for (const place &where :
-         {place{"controller", 0}, place{"controller", 41}, place{"settings", 7},
-          place{"settings", 120}, place{"settings", 225}}) {
-        rig mega;
-        heat(mega);
+    rig mega;
+    heat(mega);
+    const auto turns_over = [&mega](const place &where) {
         std::uint32_t size = 0;
         auto *const bytes =
             const_cast<std::uint8_t *>(board_variable(mega.raw(), where.variable, &size));
@@ -164,6 +165,11 @@ TEST(a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so)
         mega.run_ms(1000.0);
         TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), "it takes the spring to be cold");
         TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_COOLING, mega.view().spring[4].limits);
+    };
+    for (const place &where :
+         {place{"controller", 0}, place{"controller", 41}, place{"settings", 7},
+          place{"settings", 120}, place{"settings", 225}}) {
+        try_from_here([&] { turns_over(where); });
     }
 }
 
