@@ -22,6 +22,8 @@ INSIDE = {
     # of doors: whoever only talks to a board waits for no SciPy
     "ninespring.api",
     "ninespring.dashboard.replay_source.ReplaySource",
+    # of logs: whoever only talks to a board waits for it neither
+    "pandas",
     # half a second that only a sweep that draws its points has to wait for
     "scipy.stats.qmc",
 }
@@ -88,13 +90,13 @@ def test_imports_are_at_the_top() -> None:
     assert not hidden
 
 
-def test_what_only_talks_to_a_board_waits_for_no_scipy() -> None:
+def test_what_only_talks_to_a_board_waits_for_no_scipy_and_no_pandas() -> None:
     commands = ("console", "record", "upload", "monitor", "settings", "bringup", "dashboard")
     asks = f"""import sys
 from ninespring.cli.main import cli
 for name in {commands}:
     cli.get_command(None, name)
-print(*sorted({{"scipy", "matplotlib"}} & set(sys.modules)))"""
+print(*sorted({{"scipy", "matplotlib", "pandas"}} & set(sys.modules)))"""
     done = subprocess.run([sys.executable, "-c", asks], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
 

@@ -12,9 +12,9 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from ..errors import DECIMAL_COMMA, InputError, RefusedError, WorkError
 from . import ranges
@@ -22,6 +22,9 @@ from .belief import Belief, beliefs
 from .logs import COLUMN, EXTRA, read_text
 from .port import Port
 from .simulated import simulated_board
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 ERROR = re.compile(r"^error:(\d+) ?(.*)$")
 TELEMETRY = re.compile(r"^(?:\d+\.\d+,.*|<.*>|~S[0-9A-F]+)$")
@@ -434,6 +437,8 @@ BELIEVED = ("low_c", "high_c", "austenite")
 
 def to_pandas(readings: Iterable[Reading]) -> pd.DataFrame:
     """Return readings as a table, a row each, with a log's columns; `low1_c`, `high1_c` and `x1` (0..1) are bounds and phase."""
+    import pandas as pd
+
     return pd.DataFrame(
         {"time_s": one.time_s}
         | {

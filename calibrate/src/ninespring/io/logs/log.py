@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from ..ranges import LOG_TIME_S
 from ..statistics import rounding
@@ -17,6 +17,9 @@ from . import mending
 from .run import DriveMode, Run
 from .table import Table
 from .writing import sha256_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MAX_SPRINGS = 64
 COLUMN = re.compile(r"^(?:time_s|fan|ambient_c|([ivtf])([1-9][0-9]?)_([avcn])|u([1-9][0-9]?))$")

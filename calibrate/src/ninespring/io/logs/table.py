@@ -7,12 +7,15 @@ import math
 import re
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from ...errors import DECIMAL_COMMA, InputError
 from .writing import read_text
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MAX_LINE = 100_000
 """A line longer than this (characters) is not a log."""
@@ -130,6 +133,8 @@ class Table:
 
     def _frame(self, words: set[str]) -> pd.DataFrame:
         """Return the rows as numbers, but for the columns of `words`; the first cell that is none is refused."""
+        import pandas as pd
+
         try:
             frame = pd.read_csv(
                 io.StringIO("\n".join(self._body)),

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import click
 import numpy as np
-import pandas as pd
 
 from ...errors import InputError, WorkError
 
@@ -165,6 +164,8 @@ def log_text(
     decimals: int = 4,
 ) -> str:
     """Return a log as text: `# key: value` lines, header, rows; NaN becomes an empty cell."""
+    import pandas as pd
+
     frame = pd.DataFrame({"time_s": np.round(time_s, 6)} | columns)
     head = "".join(f"# {key}: {value}\n" for key, value in (keys or {}).items())
     return head + frame.to_csv(index=False, float_format=f"%.{decimals}f", lineterminator="\n")
