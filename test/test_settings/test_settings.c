@@ -96,17 +96,13 @@ TEST(every_setting_is_found_by_its_name)
             TEST_ASSERT_EQUAL_MESSAGE(element, at, name);
         }
     }
-    TEST_ASSERT_FALSE(settings_find("loss_scale", &row, &at));
-    TEST_ASSERT_FALSE(settings_find("loss_scale_0", &row, &at));
-    TEST_ASSERT_FALSE(settings_find("loss_scale_01", &row, &at));
-    TEST_ASSERT_FALSE(settings_find("loss_scale_65", &row, &at));
-    /* none of these is a number, whatever its bytes would come to */
-    TEST_ASSERT_FALSE(settings_find("loss_scale_x", &row, &at));
-    TEST_ASSERT_FALSE(settings_find("loss_scale_1/", &row, &at));
-    TEST_ASSERT_FALSE(settings_find("loss_scale_24A", &row, &at));
-    TEST_ASSERT_FALSE(settings_find("loss_scale_257", &row, &at));
-    TEST_ASSERT_FALSE(settings_find("loss_w_per_kk", &row, &at));
-    TEST_ASSERT_FALSE(settings_find("", &row, &at));
+    /* some end in what is no number, whatever its bytes would come to */
+    static const char *const none[] = {
+        "loss_scale",    "loss_scale_0",   "loss_scale_01",  "loss_scale_65", "loss_scale_x",
+        "loss_scale_1/", "loss_scale_24A", "loss_scale_257", "loss_w_per_kk", ""};
+    for (size_t n = 0; n < ROWS(none); n++) {
+        TEST_ASSERT_FALSE_MESSAGE(settings_find(none[n], &row, &at), none[n]);
+    }
 }
 
 TEST(assigns_fixed_decimals)
