@@ -162,29 +162,19 @@ def test_a_sensor_that_freezes_half_way_is_left_out_from_there(tmp_path: Path, s
     assert any("frozen" in note and "t1_c" in note for note in run.notes)
 
 
-def test_a_saturated_sensor_is_left_out_and_said(make_log) -> None:
-    def clip(columns: dict[str, np.ndarray]) -> None:
+def test_a_saturated_sensor_a_dead_one_and_a_glitch_are_left_out_and_said(make_log) -> None:
+    def broken(columns: dict[str, np.ndarray]) -> None:
         columns["t3_c"] = np.minimum(columns["t3_c"], 45.0)
-
-    run = read_log(make_log(change=clip))
-    assert any("t3_c" in note and "saturated" in note for note in run.notes)
-    assert np.nanmax(run.temperature_c[:, 2]) < 45.0 - 3 * 0.3
-
-
-def test_a_dead_sensor_is_left_out_and_said(make_log) -> None:
-    run = read_log(make_log(change=lambda c: c.update(t7_c=np.full(600, 21.0))))
-    assert np.isnan(run.temperature_c[:, 6]).all()
-    assert any("dead" in note for note in run.notes)
-
-
-def test_a_glitch_is_left_out_and_nothing_else(make_log) -> None:
-    def spike(columns: dict[str, np.ndarray]) -> None:
+        columns["t7_c"][:] = 21.0
         columns["t1_c"][250] += 40.0
 
-    clean = read_log(make_log("clean.csv"))
-    run = read_log(make_log(change=spike))
+    clean, run = read_log(make_log("clean.csv")), read_log(make_log(change=broken))
     assert not np.isnan(clean.temperature_c).any()
+    assert any("t3_c" in note and "saturated" in note for note in run.notes)
+    assert np.nanmax(run.temperature_c[:, 2]) < 45.0 - 3 * 0.3
+    assert np.isnan(run.temperature_c[:, 6]).all() and any("dead" in note for note in run.notes)
     assert np.flatnonzero(np.isnan(run.temperature_c[:, 0])).tolist() == [250]
+    assert np.array_equal(np.delete(run.temperature_c, [0, 2, 6], 1), np.delete(clean.temperature_c, [0, 2, 6], 1))
 
 
 @pytest.mark.parametrize("off_k", [16.0, -52.0])
@@ -319,14 +309,12 @@ def test_rows_here_and_there_that_are_missing_are_said(make_log) -> None:
     assert any("rows are missing" in note for note in run.notes)
 
 
-def test_one_column_in_fahrenheit_is_refused_by_its_name(make_log) -> None:
+def test_one_column_in_fahrenheit_is_refused_by_its_name_and_a_hot_start_is_not(make_log) -> None:
     path = make_log(change=lambda c: c.update(t3_c=c["t3_c"] * 1.8 + 32))
     with pytest.raises(InputError, match=r"spring 3 .* Fahrenheit") as caught:
         read_log(path)
     assert (caught.value.line, caught.value.column) == (2, path.read_text().splitlines()[1].index(",68.") + 2)
 
-
-def test_a_hot_start_is_not_fahrenheit(make_log) -> None:
     def hot(columns: dict[str, np.ndarray]) -> None:
         columns["t3_c"] = 20.0 + 48.0 * np.exp(-np.arange(600.0) / 60) + columns["t3_c"] * 1e-3
 
