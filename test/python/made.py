@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +28,18 @@ needs_simulator = pytest.mark.skipif(not SIM.exists(), reason=f"SKIPPED: {SIM} i
 needs_board = pytest.mark.skipif(
     not (SIM.exists() and ELF.exists()), reason=f"SKIPPED: {SIM} or {ELF} is not there: script/build makes them"
 )
+
+
+@contextmanager
+def simulated_board(*more: str) -> Iterator[tuple[str, ...]]:
+    """Yield the port of a simulated board, and that of its thermometers where it has some; it is ended as Ctrl-C would."""
+    words = [SIM, "board", "--elf", ELF, *more]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        ports = tuple(process.stdout.readline().strip() for _ in range(1 + ("--thermometers" in more)))
+        assert all(port.startswith("/dev/") for port in ports), "no pty"
+        yield ports
+        process.send_signal(signal.SIGINT)
 
 
 def searched(run: Run) -> search.Search:

@@ -6,7 +6,6 @@ Needs `ninespring-sim` and the firmware's ELF: NINESPRING_SIM and NINESPRING_AVR
 from __future__ import annotations
 
 import json
-import signal
 import subprocess
 import sys
 import time
@@ -16,7 +15,7 @@ from pathlib import Path
 import command
 import numpy as np
 import pytest
-from made import ELF, SIM, needs_board
+from made import SIM, needs_board, simulated_board
 from ninespring.io.board import Board
 from ninespring.io.logs import read_log, read_table
 from websockets.sync.client import connect
@@ -68,13 +67,8 @@ def measured(folder: Path, name: str, **values: object) -> Path:
 @pytest.fixture
 def board(request: pytest.FixtureRequest) -> Iterator[str]:
     """Return the port of a simulated board with its plant, ended at the end; its speed may be asked for."""
-    words = [SIM, "board", "--elf", ELF, "--speed", getattr(request, "param", "max")]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        port = process.stdout.readline().strip()
-        assert port.startswith("/dev/"), "no pty"
+    with simulated_board("--speed", getattr(request, "param", "max")) as (port,):
         yield port
-        process.send_signal(signal.SIGINT)
 
 
 def settings_of(port: str) -> dict[str, float]:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from command import alone, ended, process
 from fake_board import FakeBoard
-from made import ELF, SIM, needs_board
+from made import needs_board, simulated_board
 from ninespring.cli.calibrate import FROM
 from ninespring.cli.calibration import chain, judged
 from ninespring.cli.calibration.chain import Calibration, left_of
@@ -36,12 +36,9 @@ def refused(*words: object) -> str:
 @pytest.fixture
 def ports() -> Iterator[tuple[str, str]]:
     """Yield the ports of a simulated board, whose array loses more at its edge than its chip knows, and of its thermometers."""
-    words = [SIM, "board", "--elf", ELF, "--speed", "max", "--thermometers", "pty"]
-    words += ["--set", "plant.effects=latent_heat,resistance_phase,edge_loss", "--set", "plant.edge_loss_fraction=0.25"]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        yield process.stdout.readline().strip(), process.stdout.readline().strip()
-        process.send_signal(signal.SIGINT)
+    words = ["--set", "plant.effects=latent_heat,resistance_phase,edge_loss", "--set", "plant.edge_loss_fraction=0.25"]
+    with simulated_board("--speed", "max", "--thermometers", "pty", *words) as (board, thermometers):
+        yield board, thermometers
 
 
 def rows_in(folder: Path, name: str) -> int:
