@@ -15,9 +15,9 @@
 #define LEVEL_BAND          0.05f /* a held level may be off by so much before it is sought again */
 #define LEVEL_POWER_W       0.4f  /* beyond the hold: heating to a level slows down */
 
-/* Beyond the hold, from half of the phase on, of a heating to full from a level: the middle of the
+/* Beyond the hold, from half of the phase on, of a heating from a level: the middle of the
  * wire had most of that, and is heated by all that its crimped ends still take up to transform. One
- * that was off has cooled faster than its ends could go ahead. */
+ * that was fully on has cooled faster than its ends could go ahead. */
 #define PART_POWER_W 0.15f
 #define PART_LEAST   (2.0f * LEVEL_BAND)
 #define PART_MOST    0.8f /* what is left then, a fifth, takes up no more than a hold's margin */
@@ -138,8 +138,12 @@ static void enter(drive_policy_t *policy, const drive_policy_input_t *in, uint8_
     drive_policy_spring_t *s = &policy->spring[k];
     supply_queue_remove(&policy->queue, k);
     s->floor_ma = s->stage == DRIVE_POLICY_STAGE_HOLD ? s->wanted_ma : 0; /* until its turn */
-    const float phase = s->stage != DRIVE_POLICY_STAGE_OFF ? phase_of(in, k) : 0.0f;
-    s->partly = phase > PART_LEAST && phase < PART_MOST;
+    if (s->stage != DRIVE_POLICY_STAGE_OFF && spring_estimator_sees(belief_of(in, k))) {
+        const float phase = phase_of(in, k);
+        s->partly = phase > PART_LEAST && phase < PART_MOST;
+    } else if (spring_estimator_possible(belief_of(in, k)) == SPRING_PHASE_MARTENSITE) {
+        s->partly = false; /* before that: as it was left */
+    }
     s->stage = (uint8_t)stage;
     const thermal_model_transformation_t points = thermal_model_transformation(in->model, k);
     s->wanted_ma = (uint16_t)(LOWER_MA + policy->parameters.dither_ma); /* for a turn */
@@ -225,8 +229,8 @@ static void heat(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
         enter(policy, in, k, DRIVE_POLICY_STAGE_HOLD, level_permille);
         return;
     }
-    const bool slows =
-        (!full || (s->partly && phase_of(in, k) > 0.5f)) && c7 > points.austenite_start_c7 - 128;
+    const bool ahead = s->partly && phase_of(in, k) > 0.5f;
+    const bool slows = (!full || ahead) && c7 > points.austenite_start_c7 - 128;
     /* what it keeps it keeps until its turn: else what its current reads could take it away. It may
      * have begun to lose phase: then it waits where it loses no more */
     const bool keeps = waits_for_supply(s) && (s->floor_ma != 0 || phase_of(in, k) > 0.5f * level);
@@ -234,7 +238,7 @@ static void heat(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
     if (slows || keeps) {
         const float margin_k = kelvin(policy->parameters.hold_margin_cc);
         const float short_k = full ? fmaxf(below_k(in, k, margin_k), 0.0f) : 0.0f;
-        const float more_w = !slows ? 0.0f : full ? PART_POWER_W : LEVEL_POWER_W;
+        const float more_w = !slows ? 0.0f : ahead ? PART_POWER_W : LEVEL_POWER_W;
         const uint16_t keeps_ma = hold_current_ma(policy, in, k, short_k, more_w);
         if (slows && keeps_ma < s->wanted_ma) {
             s->wanted_ma = keeps_ma;

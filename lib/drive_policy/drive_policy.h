@@ -68,7 +68,7 @@ typedef struct {
     uint8_t asked;          /* its level, in steps of 4 permille */
     bool released : 1;      /* switched off hot: no false actuation */
     bool tripped : 1;
-    bool partly : 1; /* its stage began at a level of the phase */
+    bool partly : 1; /* its stage, or the last one, began at a level of the phase */
 } drive_policy_spring_t;
 
 typedef struct {

@@ -404,23 +404,28 @@ TEST(way_down_ends_at_its_level)
     }
 }
 
-/* A heating from a level to full: from half of the phase on the middle of the wire has its own, and
- * what heats beyond the hold is 0.15 W. Not from off, nor where a fifth or less is missing. */
-TEST(heating_from_a_level_to_full_slows_at_half)
+/* A heating from a level: from half of the phase on the middle of the wire has its own, and
+ * what heats beyond the hold is 0.15 W. Nor where a fifth or less is
+ * missing; from off where it was left so, and may have some still. */
+TEST(heating_from_a_level_slows_at_half)
 {
     static const struct {
         drive_policy_stage_t from;
         float began, phase, c;
-        bool slows;
-    } table[] = {{HOLD, 0.15f, 0.51f, 87.1f, true},  {LOWER, 0.15f, 0.51f, 87.1f, true},
-                 {HOLD, 0.15f, 0.49f, 87.1f, false}, {HOLD, 0.15f, 0.51f, 86.9f, false},
-                 {HOLD, 0.101f, 0.51f, 87.1f, true}, {HOLD, 0.099f, 0.51f, 87.1f, false},
-                 {HOLD, 0.799f, 0.85f, 87.1f, true}, {HOLD, 0.801f, 0.85f, 87.1f, false},
-                 {OFF, 0.15f, 0.51f, 87.1f, false}};
+        bool slows, left;
+        uint8_t possible;
+    } table[] = {
+        {HOLD, 0.15f, 0.51f, 87.1f, true, false, B},  {LOWER, 0.15f, 0.51f, 87.1f, true, false, B},
+        {HOLD, 0.15f, 0.49f, 87.1f, false, false, B}, {HOLD, 0.15f, 0.51f, 86.9f, false, false, B},
+        {HOLD, 0.101f, 0.51f, 87.1f, true, false, B}, {HOLD, 0.099f, 0.51f, 87.1f, false, false, B},
+        {HOLD, 0.799f, 0.85f, 87.1f, true, false, B}, {HOLD, 0.801f, 0.85f, 87.1f, false, false, B},
+        {OFF, 0.15f, 0.51f, 87.1f, false, false, B},  {OFF, 0.0f, 0.51f, 87.1f, true, true, B},
+        {OFF, 0.0f, 0.51f, 87.1f, false, true, M}};
     for (size_t n = 0; n < ROWS(table); n++) {
         begin(1, 2);
-        believed(0, 80.0f, B, table[n].began);
+        believed(0, 80.0f, table[n].possible, table[n].began);
         stands(0, table[n].from, 1000);
+        policy.spring[0].partly = table[n].left;
         turn_of(0);
         row(n);
         TEST_ASSERT_EQUAL(HEAT, drive_policy_stage(&policy, 0));
@@ -430,6 +435,14 @@ TEST(heating_from_a_level_to_full_slows_at_half)
         const int asks_ma = table[n].slows ? ma_of(GIVES_W + 0.15f) : BOOST_MA;
         TEST_ASSERT_INT_WITHIN(1, asks_ma, policy.spring[0].wanted_ma);
     }
+    begin(1, 2);
+    believed(0, 80.0f, B, 0.15f);
+    stands(0, HOLD, 150);
+    level[0] = 900; /* and to a higher one */
+    turn_of(0);
+    believed(0, 87.1f, B, 0.51f);
+    turn_of(0);
+    TEST_ASSERT_INT_WITHIN(1, ma_of(GIVES_W + 0.15f), policy.spring[0].wanted_ma);
 }
 
 /* What was tried for one level is not held against another; one that is asked for fully on its way
