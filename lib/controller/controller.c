@@ -219,6 +219,10 @@ static bool declare(controller_t *controller, const thermal_model_parameters_t *
     for (uint8_t k = 0; k < controller->springs; k++) {
         temperature_ceiling_declare(&controller->ceiling, model, k, &before[k].ceiling);
         spring_estimator_keep_loss(&controller->estimator, model, k, before[k].gives_w);
+        if (controller_duty(controller, k) != 0 &&
+            spring_estimator_lacks_contact(&controller->estimator, model, k)) {
+            safety_trip(&controller->safety, k, SAFETY_FAULT_SENSOR_MISMATCH);
+        }
     }
     return true;
 }
@@ -325,11 +329,12 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
             continue;
         }
         sum_ma += controller_flowing_ma(controller->measured_ma[k]);
-        const uint32_t heating_uw = thermal_model_heating_uw(
-            &controller->model, k, controller_flowing_ma(controller->measured_ma[k]),
-            controller_positive_mv(controller->measured_mv[k]));
-        controller->power_sum_uw[k] += heating_uw;
-        controller->heat_sum_uw[k] += heating_uw;
+        const uint16_t flowing_ma = controller_flowing_ma(controller->measured_ma[k]);
+        const uint16_t positive_mv = controller_positive_mv(controller->measured_mv[k]);
+        controller->power_sum_uw[k] +=
+            thermal_model_heating_uw(&controller->model, k, flowing_ma, positive_mv);
+        /* with what a contact is declared to take: the ceiling believes none */
+        controller->heat_sum_uw[k] += fixed_point_mac_u16(0, flowing_ma, positive_mv);
     }
     safety_tick_board(&controller->safety, sum_ma);
     return sum_ma;

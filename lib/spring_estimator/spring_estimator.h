@@ -232,6 +232,11 @@ float spring_estimator_declared_w(const thermal_model_t *model, uint8_t spring);
  * declared stays. To be called before spring_estimator_prepare. */
 void spring_estimator_keep_loss(spring_estimator_t *estimator, const thermal_model_t *model,
                                 uint8_t spring, float before_w);
+/* True if and only if a contact is declared that leaves of what its martensite read in this
+ * heating, or its austenite when it transformed, less than any martensite of the declared one has:
+ * it is not there. */
+bool spring_estimator_lacks_contact(const spring_estimator_t *estimator,
+                                    const thermal_model_t *model, uint8_t spring);
 /* Its loss beyond the declared one is no more known than of any spring: it was learnt beside a
  * model that nobody knows. */
 void spring_estimator_forget_loss(spring_estimator_t *estimator, uint8_t spring);

@@ -176,6 +176,22 @@ static float unexplained(float change, float step_k)
     return more > 0.0f ? more : less < 0.0f ? less : 0.0f;
 }
 
+/* What a contact that is declared leaves to the spring of what was read. */
+static float behind_contact_ohm(const thermal_model_t *model, uint8_t k, float ohm)
+{
+    return ohm - 1e-6f * (float)model->parameters.contact_uohm[k];
+}
+
+bool spring_estimator_lacks_contact(const spring_estimator_t *e, const thermal_model_t *model,
+                                    uint8_t k)
+{
+    const spring_belief_t *b = &e->spring[k];
+    const bool holds = !b->heating && b->possible == SPRING_PHASE_AUSTENITE;
+    const float ohm = b->heating ? b->run.heat.cold_ohm : holds ? b->learnt.austenite_ohm : 0.0f;
+    return spring_is_sound(e, k) && model->parameters.contact_uohm[k] != 0 && ohm > 0.0f &&
+           behind_contact_ohm(model, k, ohm) < UNLIKE_LEAST * e->martensite_ohm;
+}
+
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is
  * a transformation, whatever its sign. */
 void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
@@ -194,8 +210,9 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
     if (b->possible == SPRING_PHASE_MARTENSITE && b->run.heat.cold_ohm == 0.0f) {
         b->run.heat.cold_ohm = b->ohm;
         b->run.heat.cold_c = spring_now_c(model, k);
+        const float own_ohm = behind_contact_ohm(model, k, b->ohm);
         b->unlike =
-            b->ohm < UNLIKE_LEAST * e->martensite_ohm || b->ohm > UNLIKE_MOST * e->martensite_ohm;
+            own_ohm < UNLIKE_LEAST * e->martensite_ohm || own_ohm > UNLIKE_MOST * e->martensite_ohm;
     }
     if (b->run.heat.heat_k < b->run.heat.peak_k) {
         return; /* it had to wait: on the way back up nothing transforms, and that tells nothing */

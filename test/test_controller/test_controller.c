@@ -9,6 +9,7 @@
 #include "../run_tests.h"
 #include "controller.h"
 #include "fixed_point.h"
+#include "spring_estimator_internal.h"
 
 #define AMBIENT_C7 (20 * 128)
 
@@ -489,6 +490,60 @@ static void heat_for_4_s(void)
     controller_set_temperature(&controller, AMBIENT_C7);
     controller_set_target(&controller, 4, 1000);
     run(200);
+}
+
+/* It heats as much with a contact that is declared as without: that may not be there. */
+TEST(ceiling_believes_no_contact)
+{
+    float delivered_c[2];
+    for (unsigned n = 0; n < 2; n++) {
+        setUp();
+        settings.policy.open_current_ma = 2350;
+        settings.model.contact_uohm[4] = n * 100000u;
+        start();
+        controller_set_target(&controller, 4, 1000);
+        run(1000);
+        delivered_c[n] = controller_delivered_c(&controller, 4);
+    }
+    TEST_ASSERT_TRUE(delivered_c[0] > 50.0f);
+    TEST_ASSERT_FLOAT_WITHIN(2.0f, delivered_c[0], delivered_c[1]);
+}
+
+/* 0.1 ohm of 0.175 leave no spring, declared before it heats, as it heats, or of hot austenite in a
+ * hold; in series with one they are its contact. Of what is off nothing is compared. */
+TEST(contact_that_is_not_there_is_no_circuit)
+{
+    static const struct {
+        int32_t mohm;
+        bool first, off, hot;
+        safety_fault_t fault;
+    } row[] = {{175, true, false, false, SAFETY_FAULT_SENSOR_MISMATCH},
+               {175, false, false, false, SAFETY_FAULT_SENSOR_MISMATCH},
+               {175, false, false, true, SAFETY_FAULT_SENSOR_MISMATCH},
+               {175, false, true, false, SAFETY_FAULT_NONE},
+               {275, true, false, false, SAFETY_FAULT_NONE},
+               {275, false, false, false, SAFETY_FAULT_NONE}};
+    for (unsigned n = 0; n < ROWS(row); n++) {
+        setUp();
+        spring_mohm[4] = row[n].mohm;
+        settings.model.contact_uohm[4] = row[n].first ? 100000u : 0u;
+        heat_for_4_s();
+        if (row[n].off) {
+            controller_set_target(&controller, 4, 0);
+            run(2);
+        }
+        if (row[n].hot) {
+            spring_belief_t *const b = &controller.estimator.spring[4];
+            b->heating = false;
+            b->possible = SPRING_PHASE_AUSTENITE;
+            b->learnt.austenite_ohm = 0.22f;
+            spring_seal(&controller.estimator, 4);
+        }
+        settings.model.contact_uohm[4] = 100000u;
+        TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+        run(row[n].hot ? 1 : 100);
+        TEST_ASSERT_EQUAL(row[n].fault, controller_fault(&controller, 4));
+    }
 }
 
 static void tick_with_half_a_sensor(void)

@@ -517,7 +517,8 @@ TEST(what_still_transforms_is_no_hotter_than_that_lets_it_be)
     }
 }
 
-/* Cold martensite of 0.75 to 1.6 of the declared resistance is this circuit's. */
+/* Cold martensite of 0.75 to 1.6 of the declared resistance is this circuit's, behind the contact
+ * that is declared. */
 TEST(cold_martensite_is_compared_with_the_declared_one)
 {
     static const struct {
@@ -525,21 +526,27 @@ TEST(cold_martensite_is_compared_with_the_declared_one)
         double ohm, cold_ohm;
         bool unlike;
         double then_ohm;
-    } table[] = {{M, 0.75 * 0.175 + 0.001, 0.0, false, 0.13225},
-                 {M, 0.75 * 0.175 - 0.001, 0.0, true, 0.13025},
-                 {M, 1.6 * 0.175 - 0.001, 0.0, false, 0.279},
-                 {M, 1.6 * 0.175 + 0.001, 0.0, true, 0.281},
-                 {M, 0.5, 0.2, false, 0.2},
-                 {B, 0.5, 0.0, false, 0.0}};
+        uint32_t contact_uohm;
+    } table[] = {{M, 0.75 * 0.175 + 0.051, 0.0, false, 0.18225, 50000},
+                 {M, 0.75 * 0.175 + 0.049, 0.0, true, 0.18025, 50000},
+                 {M, 1.6 * 0.175 + 0.049, 0.0, false, 0.329, 50000},
+                 {M, 1.6 * 0.175 + 0.051, 0.0, true, 0.331, 50000},
+                 {M, 0.75 * 0.175 + 0.001, 0.0, false, 0.13225, 0},
+                 {M, 0.75 * 0.175 - 0.001, 0.0, true, 0.13025, 0},
+                 {M, 1.6 * 0.175 - 0.001, 0.0, false, 0.279, 0},
+                 {M, 1.6 * 0.175 + 0.001, 0.0, true, 0.281, 0},
+                 {M, 0.5, 0.2, false, 0.2, 0},
+                 {B, 0.5, 0.0, false, 0.0, 0}};
     for (size_t n = 0; n < ROWS(table); n++) {
         begin_heating_at(30.0, table[n].possible, 5.0);
         row(n);
         INSIDE.ohm = (float)table[n].ohm;
         INSIDE.run.heat.cold_ohm = (float)table[n].cold_ohm;
+        model.parameters.contact_uohm[0] = table[n].contact_uohm;
         spring_heating_watch(&estimator, &INSIDE, &model, 0);
         TEST_ASSERT_EQUAL(table[n].unlike, spring_estimator_is_unlike(BELIEF));
         NEAR(table[n].then_ohm, INSIDE.run.heat.cold_ohm);
-        NEAR(n < 4 ? 30.0 : 0.0, INSIDE.run.heat.cold_c);
+        NEAR(n < 8 ? 30.0 : 0.0, INSIDE.run.heat.cold_c);
     }
 }
 
