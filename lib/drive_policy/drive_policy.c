@@ -429,7 +429,9 @@ static void derate(drive_policy_t *policy, const drive_policy_input_t *in, uint8
     const float c = now_c(in, k);
     float share = derating_share(doubt_k > 0.0f ? c + doubt_k : c, limit_c, band_k);
     s->derating = share < 1.0f ? DRIVE_POLICY_LIMIT_TEMPERATURE : DRIVE_POLICY_LIMIT_NONE;
-    const float allowed = 1.0f - worst_neighbour(policy, k);
+    /* open is for who wants to see what currents alone do to the others, but for what burns */
+    const bool open = p->policy == DRIVE_POLICY_OPEN;
+    const float allowed = open ? 1.0f : 1.0f - worst_neighbour(policy, k);
     if (allowed < 1.0f && allowed <= share) {
         share = allowed;
         s->derating |= DRIVE_POLICY_LIMIT_UNDRIVEN;
@@ -608,7 +610,7 @@ static void claim_of(drive_policy_t *policy, const drive_policy_input_t *in, uin
         s->limits = said_of(policy, in, k);
     }
     uint16_t asked_ma = s->wanted_ma;
-    if (!open && s->ceiling_ma < asked_ma) {
+    if (s->ceiling_ma < asked_ma && (!open || s->derating != 0)) { /* else it is the boost's */
         asked_ma = s->ceiling_ma;
         s->limits |= s->derating;
     }

@@ -847,6 +847,32 @@ TEST(each_limit_is_said_where_it_cuts)
     }
 }
 
+/* Open, too: no current above the limit, said, and by its own temperature alone; a boost is none.
+ */
+TEST(open_is_derated_by_its_own_temperature)
+{
+    static const struct {
+        float c;
+        uint16_t gets_ma, limits;
+        uint16_t turns;
+    } table[] = {
+        {99.0f, 3200, 0, 0}, {104.0f, 1800, HOT, 0}, {109.0f, 300, HOT, 0}, {110.0f, 0, HOT, 6}};
+    parameters.policy = DRIVE_POLICY_OPEN;
+    parameters.open_current_ma = maximum_current_ma = 3200;
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin(1, 2);
+        believed(0, table[n].c, A, 1.0f);
+        stands(0, OFF, 1000);
+        policy.spring[0].derated_turns = 5;
+        policy.spring[1].severity = 1.0f;
+        turn_of(0);
+        row(n);
+        TEST_ASSERT_UINT16_WITHIN(1, table[n].gets_ma, target_ma[0]);
+        TEST_ASSERT_EQUAL_UINT16(table[n].limits, drive_policy_limits(&policy, 0));
+        TEST_ASSERT_EQUAL_UINT16(table[n].turns, policy.spring[0].derated_turns);
+    }
+}
+
 /* To the nearest milliampere, whatever the level. */
 TEST(open_current_is_its_share_of_the_level)
 {
