@@ -40,6 +40,8 @@ bool console_learnt_line(const console_t *console, console_out_t *out);
 bool console_inputs_line(console_t *console, console_out_t *out);
 /* Where inputs are streamed: a line takes effect here. In RAM. */
 void console_mark_typed(const console_t *console, const char *line);
+/* One is asked for. */
+bool console_any_spring_on(const console_t *console);
 bool console_why_line(console_t *console, console_out_t *out);
 bool console_faults_line(const console_t *console, console_out_t *out);
 

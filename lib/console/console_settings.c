@@ -176,12 +176,29 @@ console_error_t console_assign(console_t *console, const char *name, const char 
     return error == CONSOLE_OK ? error : refuse(console, name, error);
 }
 
+/* Another size begins everything anew, what is driven as well: as it was, then. */
+static bool may_take(console_t *console, const settings_t *before)
+{
+    const thermal_model_parameters_t *const was = &before->controller.model;
+    const thermal_model_parameters_t *const is = &console->settings->controller.model;
+    if ((was->rows == is->rows && was->columns == is->columns) || !console_any_spring_on(console)) {
+        return true;
+    }
+    console_open_settings(console);
+    *console->settings = *before;
+    console_seal_settings(console);
+    return false;
+}
+
 static console_error_t assign(console_t *console, const char *name, const char *value)
 {
     const settings_t before = *console->settings;
     const console_error_t error = console_assign(console, name, value);
     if (error != CONSOLE_OK) {
         return error;
+    }
+    if (!may_take(console, &before)) {
+        return CONSOLE_ERROR_SPRINGS_ON;
     }
     if (memcmp(&before.controller, &console->settings->controller, sizeof before.controller) != 0 ||
         console->conflict) {
@@ -226,9 +243,13 @@ console_error_t console_settings_line(console_t *console, char *line)
         return CONSOLE_OK;
     }
     if (flash_equal(line, FLASH_TEXT("$defaults"))) {
+        const settings_t before = *console->settings;
         console_open_settings(console);
         settings_default(console->settings);
         console_seal_settings(console);
+        if (!may_take(console, &before)) {
+            return CONSOLE_ERROR_SPRINGS_ON;
+        }
         console_apply_settings(console);
         follow_board_settings(console);
         return CONSOLE_OK;

@@ -195,7 +195,7 @@ static console_error_t word_ambient(console_t *console, const arguments_t *argum
     return error;
 }
 
-static bool any_spring_on(const console_t *console)
+bool console_any_spring_on(const console_t *console)
 {
     for (uint8_t k = 0; k < controller_springs(console->controller); k++) {
         if (controller_level_permille(console->controller, k) != 0) {
@@ -210,7 +210,7 @@ static console_error_t begin_inputs(console_t *console, const arguments_t *argum
     if (arguments->count > 1) {
         return CONSOLE_ERROR_SURPLUS_ARGUMENT; /* each tick has its line */
     }
-    if (any_spring_on(console)) {
+    if (console_any_spring_on(console)) {
         return CONSOLE_ERROR_SPRINGS_ON;
     }
     const console_error_t error = may_drive(console);
@@ -281,7 +281,7 @@ static console_error_t word_supply(console_t *console, const arguments_t *argume
 static console_error_t word_selftest(console_t *console, const arguments_t *arguments)
 {
     (void)arguments;
-    if (any_spring_on(console)) {
+    if (console_any_spring_on(console)) {
         return CONSOLE_ERROR_SPRINGS_ON;
     }
     const console_error_t error = may_drive(console);
@@ -302,7 +302,7 @@ static console_error_t word_model(console_t *console, const arguments_t *argumen
     if (!flash_equal(arguments->argument[0], FLASH_TEXT("cold"))) {
         return CONSOLE_ERROR_BAD_ARGUMENT;
     }
-    if (any_spring_on(console)) {
+    if (console_any_spring_on(console)) {
         return CONSOLE_ERROR_SPRINGS_ON;
     }
     controller_set_temperature(console->controller, console->status->ambient_c7);
@@ -319,7 +319,7 @@ static console_error_t word_learnt(console_t *console, const arguments_t *argume
     if (!flash_equal(arguments->argument[0], FLASH_TEXT("clear"))) {
         return CONSOLE_ERROR_BAD_ARGUMENT;
     }
-    if (any_spring_on(console)) {
+    if (console_any_spring_on(console)) {
         return CONSOLE_ERROR_SPRINGS_ON;
     }
     learnt_store_clear(console->learnt, console->controller);

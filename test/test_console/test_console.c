@@ -254,6 +254,29 @@ TEST(what_else_is_refused_changes_nothing_either)
     expect_error("telemetry inputs", CONSOLE_ERROR_SPRINGS_ON);
 }
 
+/* It would begin everything anew, without a word, and believe hot springs of before power-on. */
+TEST(another_size_is_refused_while_a_spring_is_driven)
+{
+    static const char *const line[] = {"$rows=2", "$columns=1", "$rows=2", "$defaults"};
+    expect_ok("unlock");
+    for (unsigned n = 0; n < 4; n++) {
+        if (n == 3) {
+            expect_ok("off all");
+            expect_ok("$rows=2");
+            TEST_ASSERT_EQUAL_UINT8(6, controller_springs(&controller));
+        }
+        expect_ok("on 1");
+        expect_error(line[n], CONSOLE_ERROR_SPRINGS_ON);
+        TEST_ASSERT_EQUAL_STRING("error:16 switch all springs off first\r\n", said);
+        TEST_ASSERT_EQUAL_UINT8(n == 3 ? 6 : 9, controller_springs(&controller));
+        TEST_ASSERT_EQUAL_UINT16(1000, controller_level_permille(&controller, 0));
+        TEST_ASSERT_TRUE(console_hold_settings(&console));
+        expect_ok("$rows");
+        TEST_ASSERT_EQUAL_STRING(n == 3 ? "$rows=2\r\nok\r\n" : "$rows=3\r\nok\r\n", said);
+        expect_ok(n == 3 ? "$rows=2" : "$rows=3"); /* the size that it has */
+    }
+}
+
 /* Every word, and every way to write it wrong; settings, too: its number, and its cure. */
 TEST(every_refusal_says_what_would_be_right)
 {
