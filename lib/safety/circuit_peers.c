@@ -98,14 +98,19 @@ static bool is_like(const circuit_peer_t *own, float share, float others)
     return own->learnt == 0 || beyond(share, others * own_part, KNOWN_PART) <= 0.0f;
 }
 
+/* Of two voltages, what one is more, of the larger one. */
+static float apart(float a, float b)
+{
+    return 1.0f - fminf(a, b) / fmaxf(a, b);
+}
+
 /* What a drop makes of a lower or higher share, as far as it is not known: it takes as much of both
  * voltages, and one more than is believed makes the share at fewer volts the lower one. */
 static float drop_mv(const circuit_source_t *source, bool is_lower, float expected_mv,
                      float other_mv)
 {
     const bool is_less = expected_mv < other_mv;
-    const float part = fminf(expected_mv / other_mv, other_mv / expected_mv);
-    return (is_lower == is_less ? source->more_mv : source->less_mv) * (1.0f - part);
+    return (is_lower == is_less ? source->more_mv : source->less_mv) * apart(expected_mv, other_mv);
 }
 
 /* Volts within an eighth: what is wrong with a drop makes an eighth of it. */
@@ -142,11 +147,13 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
         odd = !good && is_odd(own, share, others, told_mv,
                               offsets_mv + drop_mv(source, share < others * own_part, expected_mv,
                                                    other_mv));
-        /* Where offsets make more than what a share may be at the most, it teaches nothing. */
-        const float unsure_mv = alike ? 0.0f : source->unsure_mv;
+        /* Where offsets make more than what a share may be at the most, it teaches nothing; nor
+         * where a drop may that is not known: of the little that is found behind one, what an
+         * eighth more of duty brings is most. */
+        const float unsure_mv = source->unsure_mv * (alike ? apart(expected_mv, other_mv) : 1.0f);
+        const bool teaches = unsure_mv <= fminf(others, 1.0f) * (OTHER_PART * told_mv - offsets_mv);
         good = good && (!was_found(own) || is_like(own, share, others));
-        if (!odd && (good || !was_found(own)) && own->learnt < LEARN_MOST &&
-            offsets_mv + unsure_mv <= OTHER_PART * told_mv) {
+        if (!odd && (good || !was_found(own)) && own->learnt < LEARN_MOST && teaches) {
             learn(own, share / others, told_mv / VOLTS_MV);
         }
     } else if (own->was_q7 != 0) {

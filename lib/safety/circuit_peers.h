@@ -49,7 +49,8 @@ typedef struct {
  * the voltages at which the two were read and its own share was learnt. As long as its own share is
  * not known, by 18 % (its wiring, its gains); where fewer than CIRCUIT_PEERS_LEAST others are
  * driven, from what it showed before by 20 % (its supply may move), but by 5 % once it was found
- * and cleared. What is not known of the drop is let pass as far as volts differ, and acquits nobody
+ * and cleared. What is not known of the drop teaches no share as far as volts differ, more where
+ * less of them is found, and is let pass, and acquits nobody
  * who was found; nor does a window that only offsets explain. Its own share is the mean, by volts,
  * of the first 255 windows that are not odd and in which offsets make less than those 18 %, and
  * stays: so a drift is found, however slow. The others count each over its own share: a set that

@@ -253,6 +253,31 @@ TEST(beside_others_at_about_its_volts_a_share_is_learnt)
     }
 }
 
+/* A diode of 0.38 V that nobody declared, as currents rise: at a fifteenth more duty, half as much
+ * again comes through. No share is learnt of that, and by the drop that is found all are alike. */
+TEST(what_comes_through_an_unknown_drop_is_no_share)
+{
+    source = (circuit_source_t){
+        .supply_mv = 5000.0f, .step_mv = 6.25f, .unsure_mv = 600.0f, .more_mv = 500.0f};
+    const circuit_source_t now = {.supply_mv = 4896.0f,
+                                  .drop_mv = 374.0f,
+                                  .step_mv = 6.59f,
+                                  .unsure_mv = 132.0f,
+                                  .more_mv = 126.0f,
+                                  .less_mv = 132.0f};
+    for (uint8_t k = 1; k < SPRINGS; k++) {
+        TEST_ASSERT_FALSE(takes(k, 440.0f, 0.13f));
+    }
+    for (unsigned n = 0; n < 2; n++) {
+        TEST_ASSERT_FALSE(takes(0, 469.0f, 0.19f));
+    }
+    TEST_ASSERT_EQUAL_UINT8(0, peers.spring[0].learnt);
+    circuit_peers_renew(&peers, SPRINGS, &source, &now);
+    source = now;
+    TEST_ASSERT_EQUAL_HEX(0, rounds(8, SPRINGS, 500.0f, 1.0f, 1.0f));
+    TEST_ASSERT_EQUAL_UINT8(8, peers.spring[SPRINGS - 1u].learnt);
+}
+
 /* Shares of before another belief would be held against those after it. */
 TEST(another_belief_begins_anew_and_keeps_what_is_each_ones_own)
 {
