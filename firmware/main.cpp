@@ -197,7 +197,14 @@ OWN_FRAME static void run_tick(uint8_t behind)
     status.ambient_is_held = ambient_is_held(&ambient);
     inputs.fan_percent = outputs.fan_percent;
 
+    // what it reads is of duties that were not there for 20 ms, and so is what the next one reads
+    if (behind > 0) {
+        controller_hurry(&controller);
+    }
     controller_tick(&controller, &inputs, &outputs);
+    if (behind > 0) {
+        controller_hurry(&controller);
+    }
 
 #ifdef NINESPRING_HIL
     current_sensor_hil_send((uint16_t)status.ticks, &outputs);

@@ -352,11 +352,21 @@ static void learn_source(controller_t *controller)
     }
 }
 
+void controller_hurry(controller_t *controller)
+{
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        circuit_check_hurry(&controller->circuit[k]);
+    }
+}
+
 /* What no belief can talk away: is it a circuit, and how hot could it be by now? */
 static void judge_circuit(controller_t *controller, uint8_t k)
 {
     circuit_source_t *const source = &controller->source;
     circuit_window_t window;
+    if (circuit_check_drop(&controller->circuit[k])) {
+        return;
+    }
     const bool is_none = circuit_check_judge(&controller->circuit[k], source,
                                              controller->current.parameters.supply_mv, &window);
     const bool is_odd =

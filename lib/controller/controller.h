@@ -126,6 +126,10 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
  * controller_is_sound is false; then nothing is changed. Divides. */
 bool controller_restart(controller_t *controller, const controller_settings_t *settings);
 
+/* This tick or the last one was late: windows that run are of no use to who judges circuits. Before
+ * and after the tick. */
+void controller_hurry(controller_t *controller);
+
 /* One tick of 20 ms: sensors, safety, model (every 5th tick, with the mean power of the ticks),
  * belief, policy, current loops.
  * inputs are of the tick that just ended, outputs are for the one that starts. outputs of springs

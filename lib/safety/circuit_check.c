@@ -57,7 +57,9 @@ static bool is_of_one_kind(circuit_check_t *c, uint8_t dead_steps, uint16_t duty
         return true;
     }
     if (duty > dead_steps && c->duty == 0) {
+        const bool hurried = c->hurried;
         *c = begun(c);
+        c->hurried = hurried;
     }
     return duty > dead_steps || (duty == 0 && c->duty == 0);
 }
@@ -85,6 +87,15 @@ void circuit_check_take(circuit_check_t *c, uint16_t fixed_mohm, uint8_t dead_st
     c->duty_voltage += (uint32_t)duty * behind_mv;
     const uint16_t squared_mv = behind_mv < SQUARED_MOST_MV ? behind_mv : SQUARED_MOST_MV;
     c->voltage_square += (uint32_t)squared_mv * squared_mv;
+}
+
+bool circuit_check_drop(circuit_check_t *c)
+{
+    if (!c->hurried) {
+        return false;
+    }
+    *c = begun(c);
+    return true;
 }
 
 static uint8_t counted(uint8_t windows, bool bad)
@@ -168,7 +179,7 @@ bool circuit_check_judge(circuit_check_t *c, const circuit_source_t *source, uin
     }
     c->astray = counted(c->astray, astray) & 15u;
     c->unbalanced = counted(c->unbalanced, unbalanced) & 15u;
-    c->restless = counted(c->restless, restless);
+    c->restless = counted(c->restless, restless) & 15u;
     *c = begun(c);
     return c->astray >= CIRCUIT_CHECK_WINDOWS || c->unbalanced >= CIRCUIT_CHECK_BALANCE_WINDOWS ||
            c->restless >= CIRCUIT_CHECK_BALANCE_WINDOWS;

@@ -37,7 +37,8 @@ typedef struct {
     bool voltage_moved : 1;
     uint8_t astray : 4;     /* windows on end in which the voltage did not follow the duty */
     uint8_t unbalanced : 4; /* windows on end in which it was not what the duty should bring */
-    uint8_t restless;       /* windows on end in which it moved without the duty */
+    uint8_t restless : 4;   /* windows on end in which it moved without the duty */
+    bool hurried : 1;       /* a tick of this window was not 20 ms after the one before */
 } circuit_check_t;
 
 /* The last window was one of a circuit. */
@@ -63,6 +64,16 @@ static inline bool circuit_window_compares(const circuit_window_t *window)
 {
     return window->tells && window->expected_mv >= CIRCUIT_WINDOW_LEAST_MV;
 }
+
+/* A tick that came late, or soon after a late one: what is read at its end is of another duty. */
+static inline void circuit_check_hurry(circuit_check_t *check)
+{
+    check->hurried = true;
+}
+
+/* Ends a window of which nothing is to be judged, as one tick was hurried: neither sound nor odd,
+ * it ends no row. False, nothing changed, if none was. */
+bool circuit_check_drop(circuit_check_t *check);
 
 /* One tick: the duty (steps of 800) that was applied in it and, if valid, what was read at its end.
  * Above CIRCUIT_CHECK_MOST counts as that, below 0 as 0. fixed_mohm: shunt and wiring. dead_steps:

@@ -5,10 +5,17 @@
 #define BELIEF_INSIDE_H
 
 #include "spring_estimator.h"
+#include "spring_estimator_internal.h"
 
 static inline spring_belief_t *belief_inside(spring_estimator_t *estimator, uint8_t spring)
 {
     return &estimator->spring[spring];
+}
+
+/* What was set is as it was left. */
+static inline void seal_inside(spring_estimator_t *estimator, uint8_t spring)
+{
+    spring_seal(estimator, spring);
 }
 
 /* As if this turn had just been had, or none. */

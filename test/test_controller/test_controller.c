@@ -6,10 +6,10 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "../fakes/belief_inside.h"
 #include "../run_tests.h"
 #include "controller.h"
 #include "fixed_point.h"
-#include "spring_estimator_internal.h"
 
 #define AMBIENT_C7 (20 * 128)
 
@@ -533,16 +533,44 @@ TEST(contact_that_is_not_there_is_no_circuit)
             run(2);
         }
         if (row[n].hot) {
-            spring_belief_t *const b = &controller.estimator.spring[4];
+            spring_belief_t *const b = belief_inside(&controller.estimator, 4);
             b->heating = false;
             b->possible = SPRING_PHASE_AUSTENITE;
             b->learnt.austenite_ohm = 0.22f;
-            spring_seal(&controller.estimator, 4);
+            seal_inside(&controller.estimator, 4);
         }
         settings.model.contact_uohm[4] = 100000u;
         TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
         run(row[n].hot ? 1 : 100);
         TEST_ASSERT_EQUAL(row[n].fault, controller_fault(&controller, 4));
+    }
+}
+
+/* Of a window in which a tick was hurried nothing is judged, and it ends no row of those before. */
+TEST(window_of_a_hurried_tick_is_left_out)
+{
+    for (unsigned hurried = 0; hurried < 2; hurried++) {
+        setUp();
+        heat_for_4_s();
+        while (controller.circuit[4].readings != 0) {
+            run(1);
+        }
+        controller.circuit[4].unbalanced = CIRCUIT_CHECK_BALANCE_WINDOWS - 1u;
+        const circuit_peer_t peer = controller.peers.spring[4];
+        for (unsigned tick = 0; tick < CIRCUIT_CHECK_TICKS; tick++) {
+            inputs.sensor[4].voltage_mv = (int16_t)(2 * inputs.sensor[4].voltage_mv);
+            if (hurried != 0) {
+                controller_hurry(&controller);
+            }
+            run(1);
+        }
+        TEST_ASSERT_EQUAL(hurried != 0 ? CIRCUIT_CHECK_BALANCE_WINDOWS - 1u
+                                       : CIRCUIT_CHECK_BALANCE_WINDOWS,
+                          controller.circuit[4].unbalanced);
+        TEST_ASSERT_EQUAL(hurried != 0 ? SAFETY_FAULT_NONE : SAFETY_FAULT_SENSOR_MISMATCH,
+                          controller_fault(&controller, 4));
+        TEST_ASSERT_EQUAL(hurried != 0,
+                          memcmp(&peer, &controller.peers.spring[4], sizeof peer) == 0);
     }
 }
 
