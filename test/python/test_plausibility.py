@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from ninespring.find import diagnosis, doubt, plausibility, resistance
-from ninespring.io import results
+from ninespring.io import results, statistics
 from ninespring.io.logs import read_log, write_atomically
 from ninespring.model.models import Array, model_text, read_model
 from ninespring.say import page
@@ -84,6 +85,15 @@ def test_a_clock_that_is_right_is_not_suspected(make_log) -> None:
     run = read_log(make_log(effects=TRUE))
     problem, fit, _ = diagnosis.fit_effects(Array(), [run], [])
     assert plausibility.shifted_clock(problem, (fit,)) == []
+
+
+def test_a_clock_that_is_right_is_not_suspected_beside_a_fit_that_leaves_more_than_it_could(make_log) -> None:
+    """One whose errors last does: it was held against fits of other clocks that leave as little as they can."""
+    run = read_log(make_log(effects=TRUE))
+    problem, fit, _ = diagnosis.fit_effects(Array(), [run], [])
+    lasts = problem.evaluate(replace(fit, values=1.15 * fit.values))
+    assert statistics.rms(lasts.residual) > 1.5 * statistics.rms(fit.residual)
+    assert plausibility.shifted_clock(problem, (lasts,)) == []
 
 
 @pytest.mark.parametrize(("step", "said"), [(1.5, 1), (0.5, 0), (0.01, 0)])

@@ -127,6 +127,8 @@ def coarse(runs: Sequence[Run]) -> list[str]:
 
 def _moved(run: Run, rows: int) -> Run:
     """Return the run with its temperatures moved later by so many rows (earlier where negative)."""
+    if rows == 0:
+        return run
     moved = np.full_like(run.temperature_c, np.nan)
     if rows > 0:
         moved[rows:] = run.temperature_c[:-rows]
@@ -141,7 +143,7 @@ def shifted_clock(problem: Problem, fits: Sequence[Fit]) -> list[str]:
 
     Tried only where structure is left: the temperatures are moved by 1 to 128 rows, later (an effect before its
     cause: no physics does that) and, with the last
-    of the models, earlier; each is fitted again, and the best is refined to one row.
+    of the models, earlier; each is fitted again, as it is where they are, and the best is refined to one row.
     """
     step = float(np.median(np.diff(problem.runs[0].time_s)))
     shortest = min(len(run.time_s) for run in problem.runs)
@@ -150,11 +152,10 @@ def shifted_clock(problem: Problem, fits: Sequence[Fit]) -> list[str]:
     def error(which: int, rows: int) -> float:
         if (which, rows) not in tried:
             fit = fits[which]
-            if rows == 0:
-                tried[which, rows] = statistics.rms(fit.residual)
-            elif abs(rows) > shortest // 4:
+            if abs(rows) > shortest // 4:
                 tried[which, rows] = np.inf
             else:
+                # the clock as it is, too: a fit whose errors last is not the one that leaves least
                 trial = Problem(problem.array, [_moved(run, rows) for run in problem.runs], problem.declared)
                 again = trial.fit(fit.spec, fit.as_dict(), tolerance=1e-3, max_steps=8)
                 tried[which, rows] = statistics.rms(again.residual)
