@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ninespring.find import certainty, contacts, diagnosis, resistance, unknown_heat
+from ninespring.find import certainty, contacts, diagnosis, evidence, resistance, unknown_heat
 from ninespring.find.readings import Readings, readings
 from ninespring.infer.declared import base_spec
 from ninespring.infer.fit import Fit
@@ -86,6 +86,58 @@ def test_a_thermometer_that_jumps_is_no_heat(tmp_path: Path) -> None:
     (one,) = unknown_heat.find(problem, fit).events
     assert (one.kind, one.spring) == ("sensor", 7)
     assert one.size == pytest.approx(2.5, abs=0.3) and one.from_s == pytest.approx(400, abs=15)
+
+
+def test_a_thermometer_that_is_off_all_along_has_not_jumped(tmp_path: Path) -> None:
+    def off(shown: np.ndarray) -> None:
+        shown[:, 6] += 4.0
+
+    problem, fit = array_log(tmp_path / "log.csv", thermometers=off)
+    assert [one.text for one in unknown_heat.find(problem, fit).events if one.kind == "sensor"] == []
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_what_a_transformation_leaves_is_no_jump_of_a_thermometer(make_log, seed: int) -> None:
+    """It comes and goes within seconds, and a thermometer's piece is what explains it best."""
+    run = read_log(make_log(effects={"latent_heat": {}}, seed=seed, noise=0.1, seconds=500))
+    problem = Problem(Array(), [run])
+    fit = diagnosis.first_fit(problem, base_spec(problem))
+    assert evidence.unexplained(problem, fit)
+    assert [one.text for one in unknown_heat.find(problem, fit).events if one.kind == "sensor"] == []
+
+
+@pytest.mark.parametrize(("seed", "k", "wanted"), [(0, 5, ["latent_heat"]), (2, 8, ["latent_heat"]), (2, 8, [])])
+def test_a_thermometer_that_jumps_as_its_spring_transforms_is_told(
+    make_log, seed: int, k: int, wanted: list[str]
+) -> None:
+    def jump(columns: dict[str, np.ndarray]) -> None:
+        shown = columns[f"t{k + 1}_c"].copy()
+        assert 84.0 < shown[200] < 98.0, "it transforms"
+        shown[200:] += 4.0
+        columns[f"t{k + 1}_c"] = shown
+
+    run = read_log(make_log(effects={"latent_heat": {}}, seed=seed, noise=0.1, seconds=500, change=jump))
+    problem, fit, _ = diagnosis.fit_effects(Array(), [run], wanted)
+    (one,) = (one for one in unknown_heat.find(problem, fit).events if one.kind == "sensor")
+    assert one.spring == k + 1 and one.from_s == pytest.approx(200, abs=15)
+    assert one.size == pytest.approx(4.0, abs=0.3)
+
+
+@pytest.mark.parametrize(("end", "told"), [(400, True), (205, False)])
+def test_a_jump_is_where_readings_step_and_stay(end: int, told: bool) -> None:
+    """What comes back within seconds, what is slow to come, and what steps by another size is none."""
+    noise = np.random.default_rng(4).normal(0.0, 0.1, 400)
+    rows = np.arange(400.0)
+    slope = 0.01 * (rows - 200.0)
+    there = slope + noise + np.where((rows >= 203) & (rows < end), 1.0, 0.0)
+    assert unknown_heat._jumps(there, 200, 15, 1.0, 1.0, 0.1) is told
+    slow = noise + np.clip((rows - 195.0) / 10.0, 0.0, 1.0)
+    assert not unknown_heat._jumps(slow, 200, 15, 1.0, 1.0, 0.1)
+    assert not unknown_heat._jumps(there, 200, 15, 3.0, 3.0, 0.1)
+    assert not unknown_heat._jumps(there, 200, 15, -1.0, -1.0, 0.1)
+    assert not unknown_heat._jumps(noise, 200, 15, 0.3, 0.3, 0.1)
+    gone = np.where((rows > 190) & (rows < 203), np.nan, there)
+    assert unknown_heat._jumps(gone, 200, 15, 1.0, 1.0, 0.1) is told, "a gap hides when, not that"
 
 
 def test_nothing_is_told_where_nothing_is(tmp_path: Path) -> None:

@@ -4,6 +4,8 @@ What a fit leaves is explained by the fewest pieces that explain it: heat at one
 share of heat at all springs, or a sensor that jumps (which heat cannot make: heat needs time). Each piece's answer is
 simulated by the fitted model itself; what the model's own numbers could have taken up is projected out; a piece stays
 where it beats its price. Its size is a least-squares estimate with an error, and the watts over time are the sum of pieces.
+A sensor is told only where it is seen to jump, from one reading to the next: a transformation that is a little off comes and goes in seconds,
+and the piece that explains it best is a sensor's, too.
 """
 
 from __future__ import annotations
@@ -29,6 +31,10 @@ MOST = 12
 """Pieces of one run; where more would help, the rest is not made of events."""
 SMALLEST = 0.05
 """Of a spring's usual power: less heat than this is not told, whatever its evidence."""
+EACH_SIDE = 2
+"""Readings on each side by which a jump is seen: one may be the mean of before and after."""
+JUMP_NATS = 3.0
+"""Evidence, after the price of choosing its row, from which a step is a jump and no noise: one in twenty."""
 EDGES = 80
 """Edges of one run, at most: a longer run has a coarser grid."""
 
@@ -171,10 +177,57 @@ def _events_of(
     errors = np.sqrt(np.diag(np.linalg.pinv(matrix.T @ matrix)) * spread)
     out = []
     since = [float(run.time_s[row] - run.time_s[0]) for row in (*edges, -1)]
+    shown = problem.without_errors(fit.residual)[r]
+    sensors = [(k, a, b, size) for (kind, k, a, b), size in zip(chosen, sizes, strict=True) if kind == "sensor"]
     for (kind, k, a, b), size, error, nats in zip(chosen, sizes, errors, gains, strict=True):
         span_s = (since[a], since[b])
         small = abs(size) < (SMALLEST * typical_w if kind != "sensor" else 3.0 * float(noise[k]))
         if small or abs(size) < 3.0 * error:
             continue
+        if kind == "sensor":
+            steps_k = _expected(sensors, k, len(edges))
+            ends = [(edge, steps_k(edge)) for edge in (a, b) if 0 < edge < len(edges)]
+            # what is off from the first row to the last has jumped nowhere
+            if not ends or not all(_jumps(shown[:, k], e * grid, grid, step_k, size, noise[k]) for e, step_k in ends):
+                continue
         out.append(event(r, kind, k, span_s, float(size), float(error), float(nats), usual_w))
     return out
+
+
+def _expected(sensors: list[tuple[int, int, int, float]], k: int, last: int) -> Callable[[int], float]:
+    """Return what says by how much all pieces (spring, from edge, to edge, K) let thermometer k step about an edge, K."""
+
+    def step_k(edge: int) -> float:
+        up = sum(size for one, a, _, size in sensors if one == k and abs(a - edge) <= 1)
+        return up - sum(size for one, _, b, size in sensors if one == k and b < last and abs(b - edge) <= 1)
+
+    return step_k
+
+
+def _jumps(left: np.ndarray, row: int, near: int, step_k: float, size_k: float, noise_k: float) -> bool:
+    """Return whether what is left of a thermometer (rows,) steps by about `step_k` from one reading to the next, within so many rows
+    of an edge, and stays there: to half of the piece's size.
+
+    What a spring does has a slope on both sides of it: a step is what the readings there do not foretell, as far as they can. Where
+    pieces about the edge undo each other there is nothing to see.
+    """
+    if abs(step_k) < 0.5 * abs(size_k):
+        return True
+    read = np.flatnonzero(np.isfinite(left))
+    left, at, up = left[read], int(np.searchsorted(read, row)), math.copysign(1.0, step_k)
+    w = EACH_SIDE
+    rows = np.arange(max(2 * w, at - near), min(len(left) - 2 * w, at + near) + 1)
+    if not rows.size:
+        return False
+    level = up * np.convolve(left, np.full(w, 1.0 / w), "valid")  # level[j]: of left[j : j + w]
+    steps = level[rows] - level[rows - w]
+    m, seen_k = int(rows[np.argmax(steps)]), float(steps.max())
+    # so many times its own noise a step is by chance at one of these rows, one time in twenty
+    sure = math.sqrt(2.0 * (JUMP_NATS + math.log(rows.size))) * noise_k
+    if seen_k < sure * math.sqrt(2.0 / w):
+        return False
+    slope_k = 0.5 * (level[m - w] - level[m - 2 * w] + level[m + w] - level[m])
+    stays_k = up * float(np.median(left[m : m + near + 1]) - np.median(left[max(0, m - near) : m]))
+    about = max(0.5 * abs(size_k), sure * math.sqrt(2.0 / w))
+    alike = abs(seen_k - abs(step_k)) <= about and abs(stays_k - abs(step_k)) <= about
+    return bool(alike and slope_k <= 0.5 * seen_k + sure * math.sqrt(1.0 / w))
