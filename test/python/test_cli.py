@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import jsonschema
+import ninespring as ns
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -22,6 +23,7 @@ from ninespring.find import doubt
 from ninespring.infer.predict import predict
 from ninespring.io import results
 from ninespring.io.logs import log_text, read_log, read_table, write_atomically
+from ninespring.model import native
 from ninespring.model.models import Array, Model, model_text, read_model
 from rich.console import Console
 
@@ -124,6 +126,44 @@ def test_every_result_is_held_to_its_schema(make_log, tmp_path: Path) -> None:
                 published.validate(broken)
         with pytest.raises(jsonschema.ValidationError):
             published.validate(result | {"surplus": 1})
+
+
+def test_fit_takes_the_effects_that_a_diagnosis_named_by_v_over_i(make_log, tmp_path: Path) -> None:
+    """No temperature depends on them where both v and i were logged: the line `effects` of a diagnosis's model was refused."""
+
+    def steps(columns: dict[str, np.ndarray]) -> None:
+        """Heat the springs through, each with two resistances, by how much of it has transformed."""
+        rng = np.random.default_rng(8)
+        plant = native.Plant(3, 3)
+        plant.set_effects(["latent_heat"])
+        plant.reset()
+        power = 1.4 * np.column_stack([columns[f"i{k}_a"] * columns[f"v{k}_v"] for k in range(1, 10)])
+        seconds = len(power)
+        traced = plant.trace(np.arange(float(seconds)), native.POWER, power, columns["fan"], np.full(seconds, 20.0))
+        for k in range(9):
+            current = np.sqrt(power[:, k] / (0.18 + 0.035 * traced[:, k, 1]))
+            columns[f"t{k + 1}_c"] = traced[:, k, 0] + rng.normal(0.0, 0.3, seconds)
+            columns[f"i{k + 1}_a"] = current
+            columns[f"v{k + 1}_v"] = power[:, k] / np.maximum(current, 1e-9) + rng.normal(0.0, 1e-3, seconds)
+
+    log, model = make_log(effects={"latent_heat": {}}, change=steps), tmp_path / "m.toml"
+    words = ("fit", "--effects", "latent_heat,resistance_phase", log, "-o", model, "--json", tmp_path / "m.json")
+    done = ninespring(*words)
+    assert done.returncode == 0, done.stderr
+    made, told = read_model(model), json.loads((tmp_path / "m.json").read_text())
+    assert made.effects == told["effects"] == ["latent_heat", "resistance_phase"]
+    for name, ohm in (("resistance_martensite_ohm", 0.18), ("resistance_austenite_ohm", 0.215)):
+        assert made.parameters[name] == pytest.approx(ohm, rel=0.03)
+        assert made.parameters[name] == pytest.approx(told["parameters"][name]["value"], rel=1e-6)
+        assert 0.0 < made.stderr[name] < 0.01
+    assert ns.fit(log, effects=["latent_heat", "resistance_phase"]).parameters == pytest.approx(
+        made.parameters, rel=1e-5
+    )
+    # what neither shows is still refused, at its log
+    steady = make_log("steady.csv", effects={"latent_heat": {}})
+    done = ninespring("fit", "--effects", "latent_heat,resistance_phase", steady, "-o", model)
+    assert done.returncode == 2
+    assert f"{steady}: resistance_phase cannot show here: neither a temperature nor v / i depends on it" in done.stderr
 
 
 def test_the_chip_starts_again_after_gaps_and_is_seen_by_the_same_sensors(make_log) -> None:

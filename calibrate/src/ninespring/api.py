@@ -82,7 +82,8 @@ def fit(*logs: Log, effects: Sequence[str] = (), array: Array | str | Path | Non
             raise InputError(f"there is no effect '{name}': {', '.join(native.effect_names())}")
     declared, runs = _array_and_runs(logs, array)
     problem, chosen, _ = diagnosis.fit_effects(declared, runs, list(dict.fromkeys(effects)), lambda text: None)
-    return doubt.model_of_fit(problem, chosen, runs)[0]
+    second = diagnosis.by_resistance(problem, chosen, effects)
+    return doubt.model_of_fit(problem, chosen, runs, second)[0]
 
 
 def diagnose(

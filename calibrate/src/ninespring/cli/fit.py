@@ -75,12 +75,17 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
         problem, chosen, base = diagnosis.fit_effects(array, runs, wanted, say)
         say("held-out blocks")
         held = problem.holdout_rmse(chosen)
+        say("what v / i says")
+        second = diagnosis.by_resistance(problem, chosen, wanted)
         say("is the log to be doubted?")
-        model, suspect = doubt.model_of_fit(problem, chosen, runs)
+        model, suspect = doubt.model_of_fit(problem, chosen, runs, second)
     before, after = rms(base.residual), rms(chosen.residual)
     model.provenance["rmse_before_c"] = before
     errors = {"rmse_before_c": before, "rmse_c": after, "holdout_rmse_c": held, "noise_c": problem.noise_c}
     result = _result(problem, chosen, runs, suspect, errors)
+    for one in second.effects if second else ():
+        result.effects.append(one.name)
+        result.parameters |= one.parameters
     notes("", suspect)
     _write(model, result, output, json_path)
     model.name = "model.toml" if str(output) == "-" else str(output)

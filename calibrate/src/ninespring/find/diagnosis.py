@@ -790,7 +790,10 @@ def fit_effects(
     progress: Callable[[str], None] = lambda text: None,
     declared: Mapping[str, float] | None = None,
 ) -> tuple[Problem, Fit, Fit]:
-    """Fit the declared model with the effects named; return the problem, the fit and the declared model's fit."""
+    """Fit the declared model with the effects named; return the problem, the fit and the declared model's fit.
+
+    What of them no temperature shows, but v / i may, is in neither: `by_resistance` has it.
+    """
     with threadpool_limits(1):
         problem = prepare(array, runs, declared)
         known = effects.candidates(scene_of(problem))
@@ -800,10 +803,42 @@ def fit_effects(
         for effect in wanted:
             screen = found.screen(fit)
             options = [k for k, c in enumerate(screen.candidates) if c.effect == effect]
+            if not options and effect in resistance.OF_THE_WIRE:
+                continue
             if not options:
-                raise InputError(f"{effect} cannot show in these logs: nothing in them depends on it")
+                raise _cannot_show(effect, runs)
             best = max(options, key=lambda k: screen.forecast([k])[0])
             progress(f"fitting {effect}")
             fit = found.refit(fit, [screen.candidates[best]], [screen.forecast([best])[1].get(best, 1.0)])
         problem.learn_power(fit.spec, fit.values)
         return problem, _finish(problem, fit), base
+
+
+def by_resistance(problem: Problem, fit: Fit, wanted: Sequence[str]) -> resistance.Second | None:
+    """Return what v / i says of effects that are wanted and that no temperature shows, as a diagnosis says it; None where none is.
+
+    Refused where v / i does not show one of them, too.
+    """
+    missing = [effect for effect in wanted if effect not in fit.spec.effects]
+    if not missing:
+        return None
+    second = resistance.witness(problem, fit)
+    named = {one.name for one in second.effects} if second else set()
+    if second and (why := doubt.impossible(second)):
+        raise InputError(why[0], problem.runs[0].name)
+    for effect in missing:
+        if effect not in named:
+            raise _cannot_show(effect, problem.runs)
+    if "resistance_phase" not in missing:
+        raise InputError(
+            f"{missing[0]}: v / i tells it beside resistance_phase, and a model has both or none of them",
+            problem.runs[0].name,
+        )
+    kept = [one for one in second.effects if one.name in missing] if second else []
+    return replace(second, effects=kept) if second else None
+
+
+def _cannot_show(effect: str, runs: Sequence[Run]) -> InputError:
+    more = f", nor in {len(runs) - 1} more" if len(runs) > 1 else ""
+    seen = "neither a temperature nor v / i" if effect in resistance.OF_THE_WIRE else "nothing in it"
+    return InputError(f"{effect} cannot show here{more}: {seen} depends on it", runs[0].name)

@@ -14,7 +14,7 @@ from ..io import statistics
 from ..io.logs.run import Run
 from ..model import native, tables
 from ..model.models import Model
-from . import plausibility
+from . import plausibility, resistance
 from .resistance import Second
 
 POWER_UNITS = ("W", "J", "ohm")
@@ -126,10 +126,13 @@ def of_log(
     return doubts or misfit(problem, fits[-1])
 
 
-def model_of_fit(problem: Problem, fit: Fit, runs: Sequence[Run]) -> tuple[Model, list[str]]:
-    """Return the model.toml of a fit that no search made, and what is to be said of its log."""
+def model_of_fit(
+    problem: Problem, fit: Fit, runs: Sequence[Run], second: Second | None = None
+) -> tuple[Model, list[str]]:
+    """Return the model.toml of a fit that no search made, with what v / i says beside it, and what is to be said of its log."""
     left_over = statistics.rms(fit.residual) > 1.5 * problem.noise_c
     doubts = of_log(problem, runs, plausibility.swapped(runs), (fit,), left_over)
     model = model_of(problem, fit, as_shown(problem, fit))
+    resistance.into_model(model, second)
     into_model(model, problem, fit, doubts)
     return model, doubts + about_power(problem)

@@ -20,6 +20,8 @@ from . import contacts
 from .certainty import CERTAIN
 from .readings import SEEN, Linear, Readings, nats_of, readings, solve
 
+OF_THE_WIRE = "resistance_phase", "resistance_temperature"
+"""Effects that v / i puts into a model."""
 LEAST_NATS = 3.0
 """Evidence, after the price of numbers and of choosing, from which v / i names an effect: one in twenty."""
 SMALLEST_RISE = 3e-4
@@ -81,7 +83,7 @@ def into_model(model: Model, second: Second | None) -> None:
     named = {one.name: one.parameters for one in (second.effects if second else ())}
     if "resistance_phase" not in named:
         return
-    for effect in ("resistance_phase", "resistance_temperature"):
+    for effect in OF_THE_WIRE:
         for name, number in named.get(effect, {}).items():
             model.parameters[name], model.stderr[name] = number.value, number.stderr
         if effect in named and effect not in model.effects:
