@@ -213,7 +213,8 @@ def test_what_cannot_be_fitted_is_refused_before_any_work(make_log, tmp_path: Pa
         ((idle,), "no spring is ever driven"),
         ((eight,), "8 springs: say how they are arranged"),
         ((log, eight), f"{eight}: has 8 springs, {log} has 9: give logs of one array"),
-        ((log, "--effects", "ghosts"), "there is no effect 'ghosts'"),
+        ((log, "--effects", "ghosts"), "there is no effect 'ghosts': "),
+        ((log, "--effects", "latnt_heat"), "there is no effect 'latnt_heat' (did you mean latent_heat?)"),
     ):
         done = ninespring("fit", *words, "-o", tmp_path / "m.toml")
         assert done.returncode == 2

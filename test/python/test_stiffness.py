@@ -195,6 +195,7 @@ def test_a_picture_has_both_layers_side_by_side(tmp_path: Path) -> None:
     titles = [one.get_title() for one in plotting.figure(log).axes]
     assert titles[:2] == list(stiffness.LAYERS)
     shown = plotting.map_at(log, 1, 2, 29.0)
+    assert shown.axes[0].get_title(loc="left") == "29 s (bold: driven)"
     assert [one.get_xlabel() for one in shown.axes[:2]] == list(stiffness.LAYERS)
     words = [one.get_text() for at in shown.axes[:2] for one in at.texts]
     assert [one.partition(":")[0] for one in words] == ["1", "2", "3", "4"]

@@ -34,7 +34,7 @@ from .io.logs import Run, check_folder, read_log, write_atomically
 from .io.recording import Recording
 from .io.thermometers import measuring
 from .model import native
-from .model.models import Array, Model, array_of, model_text, read_array, read_model
+from .model.models import Array, Model, array_of, model_text, no_effect, read_array, read_model
 from .say.plotting import figure
 
 Log = Run | str | Path
@@ -79,7 +79,7 @@ def fit(*logs: Log, effects: Sequence[str] = (), array: Array | str | Path | Non
     """
     for name in effects:
         if name not in native.effect_names():
-            raise InputError(f"there is no effect '{name}': {', '.join(native.effect_names())}")
+            raise InputError(no_effect(name))
     declared, runs = _array_and_runs(logs, array)
     problem, chosen, _ = diagnosis.fit_effects(declared, runs, list(dict.fromkeys(effects)), lambda text: None)
     second = diagnosis.by_resistance(problem, chosen, effects)

@@ -18,7 +18,7 @@ from ..io import results
 from ..io.logs import Run
 from ..io.statistics import rms
 from ..model import effects, native
-from ..model.models import Array, Model, model_text
+from ..model.models import Array, Model, model_text, no_effect
 from .console import (
     ARRAY,
     FILE,
@@ -60,7 +60,7 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     wanted = list(dict.fromkeys(e.strip() for e in effects.split(",") if e.strip()))
     for name in wanted:
         if name not in native.effect_names():
-            raise InputError(f"there is no effect '{name}': {', '.join(native.effect_names())}")
+            raise InputError(no_effect(name))
     for path in logs:
         if steady.is_steady(path):
             raise InputError("a steady table: `ninespring diagnose` fits it, effect by effect", path, 1)

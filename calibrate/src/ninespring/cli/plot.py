@@ -27,10 +27,13 @@ Examples:
 @click.argument("log", type=FILE)
 @click.option("--model", "model_path", type=FILE, help="model.toml: what it makes of the log, dashed")
 @ARRAY
-@number("--at", ranges.PICTURE_S, "s: the array at that time instead, spring by spring")
+@number("--at", ranges.PICTURE_S, "s: the array at that time instead, spring by spring; bold: driven")
 @output("picture: .png, .svg, .pdf; .gif: the array in motion")
 def plot(log: Path, model_path: Path | None, array_path: Path | None, at: float | None, output: Path) -> None:
-    """Draw a log: each spring's temperature (degC) and what it was given."""
+    """Draw a log: each spring's temperature (degC) and what it was given.
+
+    With --at, and in a .gif, each spring of the array has its number and temperature: in bold while it is driven.
+    """
     kind = output.suffix.lower()
     if kind == ".gif" and at is not None:
         raise InputError("--at is one picture: .png, .svg or .pdf", output)

@@ -201,6 +201,12 @@ def _array(file: TomlFile, given: dict[str, Any]) -> Array:
     return array
 
 
+def no_effect(name: str) -> str:
+    """Return that there is no such effect, and which may be meant."""
+    names = native.effect_names()
+    return f"there is no effect '{name}'{did_you_mean(name, names) or ': ' + ', '.join(names)}"
+
+
 def read_array(path: str | Path) -> Array:
     """Read array.toml; refused with file, line and column where it breaks docs/files.md."""
     file = TomlFile(path)
@@ -216,8 +222,7 @@ def read_model(path: str | Path) -> Model:
     model = Model(_array(file, given), name=str(path), provenance=given.get("provenance", {}))
     for name in given.get("effects", ()):
         if name not in native.effect_names():
-            said = f"there is no effect '{name}'{did_you_mean(name, native.effect_names())}"
-            raise file.refuse(said, ("effects",), word=name)
+            raise file.refuse(no_effect(name), ("effects",), word=name)
         if name in model.effects:
             raise file.refuse(f"effect {name} appears twice; remove one", ("effects",), word=name)
         model.effects.append(name)

@@ -105,7 +105,7 @@ def _map(run: Run, rows: int, cols: int) -> tuple[Figure, Callable[[int], None]]
     out.colorbar(pictures[0], ax=list(axes), label=f"{what}, degC")
 
     def draw(row: int) -> None:
-        axes[0].set_title(f"{run.time_s[row]:.0f} s", loc="left")
+        axes[0].set_title(f"{run.time_s[row]:.0f} s (bold: driven)", loc="left", fontsize=10)
         for picture, (_, springs) in zip(pictures, layers, strict=True):
             picture.set_data(temperature[row, springs].reshape(rows, cols))
         for k, one in enumerate(words):
