@@ -33,8 +33,7 @@ from .io.importing import import_table
 from .io.logs import Run, check_folder, read_log, write_atomically
 from .io.recording import Recording
 from .io.thermometers import measuring
-from .model import native
-from .model.models import Array, Model, array_of, model_text, no_effect, read_array, read_model
+from .model.models import Array, Model, array_of, check_effects, model_text, read_array, read_model
 from .say.plotting import figure
 
 Log = Run | str | Path
@@ -77,9 +76,7 @@ def fit(*logs: Log, effects: Sequence[str] = (), array: Array | str | Path | Non
     `array` left out: a square (or 1 x 2) of the paper's spring. The model's `parameters` and `stderr` are in the units of
     their names (`heat_capacity_j_per_k`, `loss_w_per_k`, ...); `provenance["rmse_after_c"]` is its error, K rms.
     """
-    for name in effects:
-        if name not in native.effect_names():
-            raise InputError(no_effect(name))
+    check_effects(effects)
     declared, runs = _array_and_runs(logs, array)
     problem, chosen, _ = diagnosis.fit_effects(declared, runs, list(dict.fromkeys(effects)), lambda text: None)
     second = diagnosis.by_resistance(problem, chosen, effects)

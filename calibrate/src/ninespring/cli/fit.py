@@ -17,8 +17,8 @@ from ..infer.result import parameters_of
 from ..io import results
 from ..io.logs import Run
 from ..io.statistics import rms
-from ..model import effects, native
-from ..model.models import Array, Model, model_text, no_effect
+from ..model import effects
+from ..model.models import Array, Model, check_effects, model_text
 from .console import (
     ARRAY,
     FILE,
@@ -58,9 +58,7 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     half minutes that the numbers were not fitted to.
     """
     wanted = list(dict.fromkeys(e.strip() for e in effects.split(",") if e.strip()))
-    for name in wanted:
-        if name not in native.effect_names():
-            raise InputError(no_effect(name))
+    check_effects(wanted)
     for path in logs:
         if steady.is_steady(path):
             raise InputError("a steady table: `ninespring diagnose` fits it, effect by effect", path, 1)

@@ -185,8 +185,7 @@ def _events_of(
         if small or abs(size) < 3.0 * error:
             continue
         if kind == "sensor":
-            steps_k = _expected(sensors, k, len(edges))
-            ends = [(edge, steps_k(edge)) for edge in (a, b) if 0 < edge < len(edges)]
+            ends = [(e, _expected(sensors, k, e, len(edges))) for e in (a, b) if 0 < e < len(edges)]
             # what is off from the first row to the last has jumped nowhere
             if not ends or not all(_jumps(shown[:, k], e * grid, grid, step_k, size, noise[k]) for e, step_k in ends):
                 continue
@@ -194,14 +193,10 @@ def _events_of(
     return out
 
 
-def _expected(sensors: list[tuple[int, int, int, float]], k: int, last: int) -> Callable[[int], float]:
-    """Return what says by how much all pieces (spring, from edge, to edge, K) let thermometer k step about an edge, K."""
-
-    def step_k(edge: int) -> float:
-        up = sum(size for one, a, _, size in sensors if one == k and abs(a - edge) <= 1)
-        return up - sum(size for one, _, b, size in sensors if one == k and b < last and abs(b - edge) <= 1)
-
-    return step_k
+def _expected(sensors: list[tuple[int, int, int, float]], k: int, edge: int, last: int) -> float:
+    """Return by how much all pieces (spring, from edge, to edge, K) let thermometer k step about an edge, K."""
+    up = sum(size for one, a, _, size in sensors if one == k and abs(a - edge) <= 1)
+    return up - sum(size for one, _, b, size in sensors if one == k and b < last and abs(b - edge) <= 1)
 
 
 def _jumps(left: np.ndarray, row: int, near: int, step_k: float, size_k: float, noise_k: float) -> bool:

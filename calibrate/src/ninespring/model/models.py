@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import datetime
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -205,6 +205,13 @@ def no_effect(name: str) -> str:
     """Return that there is no such effect, and which may be meant."""
     names = native.effect_names()
     return f"there is no effect '{name}'{did_you_mean(name, names) or ': ' + ', '.join(names)}"
+
+
+def check_effects(names: Iterable[str]) -> None:
+    """Refuse names of which one is no effect's."""
+    for name in names:
+        if name not in native.effect_names():
+            raise InputError(no_effect(name))
 
 
 def read_array(path: str | Path) -> Array:
