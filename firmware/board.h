@@ -66,6 +66,8 @@ bool board_tick_take(uint8_t *behind);
 
 /* Next received byte or -1. '!' and '?' are taken out by the receive interrupt. */
 int16_t board_serial_read(void);
+/* Whether there is one. */
+bool board_serial_waits(void);
 /* True once after '?'. */
 bool board_serial_status_take(void);
 /* True while bytes are queued that arrived before the last '!'; they must not be obeyed. */

@@ -457,6 +457,11 @@ int16_t board_serial_read(void)
     return octet;
 }
 
+bool board_serial_waits(void)
+{
+    return receive_tail != receive_head; /* one octet each: nothing tears */
+}
+
 bool board_serial_before_stop(void)
 {
     bool before;

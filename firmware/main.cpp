@@ -71,6 +71,15 @@ static void serial_write(void *, const char *bytes, uint8_t length)
 }
 static const text_output_t serial_output = {nullptr, serial_room, serial_write};
 
+// What is typed comes first: where ticks take long, telemetry would fill the port for ever.
+static uint16_t telemetry_room(void *)
+{
+    const uint16_t room = board_serial_room();
+    const bool typed = board_serial_waits() && !console_busy(&console);
+    const uint16_t needed = typed ? 2u * CONSOLE_ROOM_BYTES : 0u; // as console_ready has it
+    return room > needed ? (uint16_t)(room - needed) : 0u;
+}
+
 static uint8_t eeprom_read(void *, uint16_t address)
 {
     return board_eeprom_read(address);
@@ -222,7 +231,9 @@ OWN_FRAME static void run_tick(uint8_t behind)
     if (tick_us > status.tick_longest_us) {
         status.tick_longest_us = tick_us > UINT16_MAX ? UINT16_MAX : (uint16_t)tick_us;
     }
-    telemetry_tick(&telemetry, &controller, &status.time, inputs.ambient_c7, &serial_output);
+    text_output_t rest = serial_output; // on the stack: constants would take RAM
+    rest.room = telemetry_room;
+    telemetry_tick(&telemetry, &controller, &status.time, inputs.ambient_c7, &rest);
     telemetry_inputs(&telemetry, &controller, &inputs, (uint16_t)status.ticks, &serial_output);
 }
 

@@ -27,11 +27,9 @@ typedef enum {
 /* One CSV line: time, per spring current, voltage, temperature and duty, and the end of the line.
  */
 #define TELEMETRY_LINE_BYTES(springs) ((uint16_t)(39u + 29u * (springs)))
-/* Teleplot leaves this much of the transmit buffer free: the console waits for 256 bytes of room.
- * The port sends 158 between the end of one tick of 100,000 cycles, which fills the buffer so far,
- * and the begin of the next: it still lets the console answer. A CSV line is so long that its own
- * room is more than that, and one line of status a tick does not fill the port. */
-#define TELEMETRY_LEAVES_FREE_BYTES 112u
+/* Teleplot leaves this much of the transmit buffer free: a line of an answer. A CSV line is so long
+ * that its own room is more than that, and one line of status a tick does not fill the port. */
+#define TELEMETRY_LEAVES_FREE_BYTES 128u
 
 /* What was last said of a spring's limits. */
 typedef struct {
