@@ -26,7 +26,7 @@ extern "C" {
 #define SPRING_ESTIMATOR_REST_TURNS   40u    /* 10 s: the average of the readings has settled */
 #define SPRING_ESTIMATOR_BOUND_SDS    2.6f  /* standard deviations: 99 % of a normal distribution */
 #define SPRING_ESTIMATOR_LIKELY_SDS   2.0f  /* 95 % */
-#define SPRING_ESTIMATOR_NEIGHBOUR_SD 0.15f /* of the rise of a spring that its neighbours heat */
+#define SPRING_ESTIMATOR_NEIGHBOUR_SD 0.25f /* of the rise that neighbours make: couplings */
 /* Ticks with a turn, each of one spring in ten; in every fifth tick, as the model steps, is none.
  */
 #define SPRING_ESTIMATOR_ROUND   10u

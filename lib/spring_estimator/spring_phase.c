@@ -1,6 +1,6 @@
 #include "spring_estimator_internal.h"
 
-#define PHASE_SD      0.02f
+#define PHASE_SD      0.03f /* a hundredth of holds that show no loss have lost 8 % or more */
 #define PHASE_READ_SD 0.08f /* by its own resistances */
 
 /* What the phase is told by: the best that there is. */

@@ -632,8 +632,9 @@ TEST(who_is_warmer_lets_the_colder_heat_while_few_wait)
     }
 }
 
-/* An undriven one, by how hot it may be (2 sd, and 0.15 of its rise), 6 s ahead, over the last 5 K
- * below 5 K below austenite start. One that was just released counts once it has cooled. */
+/* An undriven one, by how hot it may be (2 sd, and those of 0.25 of its rise), 6 s ahead, over the
+ * last 5 K below 5 K below austenite start. One that was just released counts once it has cooled.
+ */
 TEST(undriven_spring_is_as_severe_as_hot_as_it_comes)
 {
     static const struct {
@@ -643,14 +644,14 @@ TEST(undriven_spring_is_as_severe_as_hot_as_it_comes)
         float severe;
         bool then;
     } table[] = {{50.0f, 1.0f, 0.0f, M, false, 0.0f, false},
-                 {60.0f, 2.5f, 0.0f, M, false, 0.0f, false},  /* 60 + 5 + 12 = 77 */
-                 {60.0f, 5.0f, 0.0f, M, false, 0.8f, false},  /* 82 of 78 to 83 */
-                 {60.0f, 2.5f, 0.5f, M, false, 0.4f, false},  /* + 3 */
-                 {60.0f, 5.0f, -0.5f, M, false, 0.2f, false}, /* - 3 */
-                 {60.0f, 5.0f, 0.0f, SPRING_PHASE_ANY, false, 0.0f, false},
-                 {60.0f, 5.0f, 0.0f, M, true, 0.0f, true},
-                 {60.0f, 5.0f, -9.0f, M, true, 0.0f, true},
-                 {60.0f, 2.5f, -9.0f, M, true, 0.0f, false},
+                 {56.0f, 1.5f, 0.0f, M, false, 0.0f, false},  /* 56 + 3 + 18 = 77 */
+                 {56.0f, 4.0f, 0.0f, M, false, 0.8f, false},  /* 82 of 78 to 83 */
+                 {56.0f, 1.5f, 0.5f, M, false, 0.4f, false},  /* + 3 */
+                 {56.0f, 4.0f, -0.5f, M, false, 0.2f, false}, /* - 3 */
+                 {56.0f, 4.0f, 0.0f, SPRING_PHASE_ANY, false, 0.0f, false},
+                 {56.0f, 4.0f, 0.0f, M, true, 0.0f, true},
+                 {56.0f, 4.0f, -9.0f, M, true, 0.0f, true},
+                 {56.0f, 1.5f, -9.0f, M, true, 0.0f, false},
                  {90.0f, 1.0f, 0.0f, B, false, 1.0f, false}};
     for (size_t n = 0; n < ROWS(table); n++) {
         begin(1, 2);
