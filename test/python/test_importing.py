@@ -54,6 +54,12 @@ def test_frames_of_any_size_become_a_temperature_a_spring(tmp_path: Path) -> Non
         spring_temperatures()
 
 
+def test_frames_of_a_folder_come_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+    for k in range(12):
+        (tmp_path / f"Rec-1_{k}.csv").write_text(f"{k}\n")
+    assert [float(frame[0, 0]) for frame in importing.frames_of(tmp_path)[1]] == list(range(12))
+
+
 @fuzzed
 @given(
     st.lists(st.tuples(st.floats(0.0, 3.0), st.floats(-10.0, 150.0)), min_size=4, max_size=12),

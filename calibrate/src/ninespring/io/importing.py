@@ -228,11 +228,16 @@ def read_regions(path: str | Path) -> list[Region]:
     return sorted(regions, key=lambda one: one.spring)
 
 
+def _by_numbers(path: Path) -> list[str | int]:
+    """Return what sorts names so that frame 10 follows frame 9, whether or not its number is written 010."""
+    return [int(one) if one.isdecimal() else one for one in re.split(r"([0-9]+)", path.stem)]
+
+
 def frames_of(path: str | Path) -> tuple[int, Iterator[np.ndarray]]:
     """Return the count of frames and an iterator over them: .npy (frames, height, width), or a folder of CSVs."""
     path = Path(path)
     if path.is_dir():
-        files = sorted(path.glob("*.csv"))
+        files = sorted(path.glob("*.csv"), key=_by_numbers)
         if not files:
             raise InputError("no .csv frame in this folder", path)
         return len(files), map(_read_frame, files)
