@@ -194,6 +194,11 @@ def test_frames_are_put_into_a_log_on_its_clock(tmp_path: Path) -> None:
         assert np.flatnonzero(np.isfinite(run.temperature_c[:, 0]))[0] + 30 == first
         assert run.temperature_c[-1, 0] == pytest.approx(20.0 + 0.25 * (39 - first))
         assert "# board: 7" in merged.read_text()
+    broken = {"t1_c": np.array([20.0, 21.0, 22.0, 50.0])}  # the camera stood still from 2 s to 30 s
+    long = tmp_path / "long.csv"
+    long.write_text(log_text(np.arange(32.0), {"i1_a": np.ones(32)}))
+    between = importing.merge_into_log(long, np.array([0.0, 1.0, 2.0, 30.0]), 1.0, 0.0, broken).splitlines()[2:]
+    assert [k for k, row in enumerate(between) if not row.endswith(",")] == [0, 1, 2, 30]
     with pytest.raises(InputError, match="never meet"):
         importing.merge_into_log(log, None, 2.0, 900.0, rising)
     with pytest.raises(InputError, match="only one of them is within"):

@@ -17,6 +17,7 @@ from msgspec import Meta
 
 from ..errors import InputError
 from .logs import COLUMN, LIMITS, MAX_SPRINGS, log_text, number_in, read_bytes, read_table, read_text
+from .logs.mending import longest_step
 from .toml_file import Keys, TomlFile, whole
 from .toml_file import number as a_number
 
@@ -345,7 +346,7 @@ def merge_into_log(
     offset_s: float,
     columns: dict[str, np.ndarray],
 ) -> str:
-    """Return a log's text with camera temperatures put onto its times (straight lines between frames).
+    """Return a log's text with camera temperatures put onto its times (straight lines between frames, none across a gap).
 
     Frames without times of their own begin with the log's first row; `offset_s` is added to either.
     """
@@ -366,9 +367,12 @@ def merge_into_log(
     merged = {name: table.frame[name] for name in table.names if name != "time_s"}
     for name, values in columns.items():
         good = np.isfinite(values)
-        merged[name] = (
+        merged[name] = line = (
             np.interp(time_s, when[good], values[good], left=np.nan, right=np.nan)
             if good.any()
             else np.full(len(time_s), np.nan)
         )
+        for before, after in itertools.pairwise(when[good]):
+            if after - before > longest_step(when):
+                line[(time_s > before) & (time_s < after)] = np.nan
     return log_text(time_s, merged, table.keys | {"temperatures_from": "camera frames"}, 5)

@@ -271,11 +271,15 @@ def begins_warm(run: Run) -> bool:
     return bool(moved.max() < 0.5)
 
 
+def longest_step(time_s: np.ndarray) -> float:
+    """Return how far two of these times may lie apart, s: what is longer is a gap, and nothing is known of what was in it."""
+    return max(10.0, 5.0 * float(np.median(np.diff(time_s))))
+
+
 def find_gaps(run: Run) -> None:
     """Find gaps in time: after each the simulation starts again from what is measured."""
     step = np.diff(run.time_s)
-    usual = float(np.median(step))
-    limit = max(10.0, 5.0 * usual)
+    usual, limit = float(np.median(step)), longest_step(run.time_s)
     gaps = np.flatnonzero(step > limit)
     for row in gaps:
         begin = int(row) + 1
