@@ -144,7 +144,8 @@ def test_any_grid_is_read_or_refused_with_one_line(tmp_path: Path, grid: dict[st
         assert all(one.right > one.left and one.bottom > one.top for one in regions)
 
 
-def test_a_logger_with_dates_quotes_and_an_old_character_set_is_read(tmp_path: Path) -> None:
+@pytest.mark.parametrize("encoding", ["cp1252", "utf-8-sig", "utf-16"])
+def test_a_logger_with_dates_quotes_and_an_old_character_set_is_read(tmp_path: Path, encoding: str) -> None:
     (tmp_path / "map.toml").write_text(
         '[file]\nskip_lines = 1\n[columns]\ntime_s = {column = "Zeit", unit = "iso"}\n'
         't1_c = "Temp (°C)"\nu1 = {column = "Duty", unit = "%"}\n',
@@ -152,7 +153,7 @@ def test_a_logger_with_dates_quotes_and_an_old_character_set_is_read(tmp_path: P
     )
     (tmp_path / "logger.csv").write_bytes(
         'Logger 7\n"Zeit","Temp (°C)","Duty"\n"2026-01-31 23:59:59.5","20.5","50"\n\n'
-        '"2026-02-01 00:00:01.0","21","0"\n'.encode("cp1252")
+        '"2026-02-01 00:00:01.0","21","0"\n'.encode(encoding)
     )
     text = importing.import_table(tmp_path / "logger.csv", tmp_path / "map.toml")
     rows = [line.split(",") for line in text.splitlines() if line[0] not in "#t"]

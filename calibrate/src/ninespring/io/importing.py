@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import itertools
 import math
@@ -111,7 +112,7 @@ def _split(path: str | Path, separator: str = "", decimal: str = "", skip_lines:
     """Return a table's cells; what is not said of separator and decimal sign its header tells."""
     raw = read_bytes(path)
     try:
-        text = raw.decode("utf-8-sig")
+        text = raw.decode("utf-16" if raw[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "utf-8-sig")
     except UnicodeDecodeError:
         text = raw.decode("cp1252", "replace")
     if not text.strip():
@@ -179,7 +180,7 @@ def _column(table: _Cells, name: str, rule: dict[str, Any], path: str | Path) ->
         shown, before = cells.iloc[row - 1], table.lines[row].split(table.separator)[: has.index(found)]
         hint = ' (decimal = ","?)' if "," in shown and not iso and table.decimal != "," else ""
         raise InputError(
-            f"'{shown}' in column '{found}' is not a {'time' if iso else 'number'}{hint}",
+            f"'{shown}' in column '{found}' is not a {'time: 2026-01-31 12:00:00.5 is one' if iso else 'number'}{hint}",
             path,
             table.numbers[row],
             1 + sum(len(one) + 1 for one in before),
