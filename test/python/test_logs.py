@@ -177,6 +177,25 @@ def test_a_saturated_sensor_a_dead_one_and_a_glitch_are_left_out_and_said(make_l
     assert np.array_equal(np.delete(run.temperature_c, [0, 2, 6], 1), np.delete(clean.temperature_c, [0, 2, 6], 1))
 
 
+def test_spikes_are_left_out_however_many_and_up_to_four_rows_long(make_log) -> None:
+    def loose(columns: dict[str, np.ndarray]) -> None:
+        columns["t1_c"][20::45] += 60.0
+        columns["t2_c"][np.add.outer(np.arange(20, 590, 45), [0, 1]).ravel()] -= 40.0
+        columns["t3_c"][np.add.outer(np.arange(20, 590, 90), range(4)).ravel()] += 30.0
+        columns["t4_c"][200:400] += np.random.default_rng(1).normal(0.0, 3.0, 200)
+        columns["t5_c"] = np.floor(np.arange(600.0) / 60.0) + (np.arange(600) % 25 == 0)  # steps, and flickers
+
+    clean, run = read_log(make_log("clean.csv")), read_log(make_log(change=loose))
+    away = np.abs(run.temperature_c[:, :3] - clean.temperature_c[:, :3])
+    assert np.nanmax(away) < 3.0 and np.isnan(away).sum(axis=0).tolist() == [13, 26, 28]
+    assert np.isnan(run.temperature_c[:, 3:5]).sum() <= 2, "what is restless, or steps, is no row of spikes"
+
+
+def test_a_peak_between_rows_far_apart_is_no_spike(tmp_path: Path) -> None:
+    rows = "".join(f"{60 * k},{k % 80 == 4:d},{20 + 0.1 * (k % 3) + 40 * (k % 80 == 5):.1f}\n" for k in range(200))
+    assert np.isfinite(read(tmp_path, HEADER + rows).temperature_c).all()
+
+
 @pytest.mark.parametrize("off_k", [16.0, -52.0])
 def test_a_first_reading_that_is_a_spike_is_where_no_simulation_starts(make_log, off_k: float) -> None:
     def spike(columns: dict[str, np.ndarray]) -> None:

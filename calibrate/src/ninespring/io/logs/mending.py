@@ -10,7 +10,7 @@ import warnings
 import numpy as np
 
 from ...errors import InputError
-from ..statistics import noise_floor
+from ..statistics import noise_floor, rounding
 from .run import Run
 from .table import Table
 
@@ -25,6 +25,8 @@ RESTED_K = 3.0
 """How far below its first readings a spring may come that began at its room: a room drifts, in Fahrenheit twice as far."""
 QUICKER = 4.0
 """Times as far as from row to row afterwards a thermometer may go in its first row, rows being as far apart as its spring is slow."""
+QUICKEST_S = 15.0
+"""In which a spring answers at the soonest: 0.17 J/K that lose 11 mW/K to a fan's air."""
 RUN_IN_S = 120.0
 """After a gap: how long the noise of the temperatures that the simulation starts from is still felt."""
 
@@ -210,30 +212,46 @@ def mend_placeholders(run: Run) -> None:
 
 
 def mask_glitches(run: Run) -> None:
-    """Single samples far from the straight line between their neighbours, and from those that lead there and away.
+    """Up to four rows far from the straight line between those around them, and from those that lead there and away.
 
     No spring moves like that; one that is switched goes on in another direction, and is where one of the lines leads.
     """
-    noise = noise_floor(run.temperature_c)
+    noise = np.maximum(noise_floor(run.temperature_c), rounding(run.temperature_c))
     for k in range(run.springs):
         values = run.temperature_c[:, k]
         if np.isfinite(values).sum() < 30 or not np.isfinite(noise[k]):
             continue
-        before, after = values[:-2], values[2:]
-        away = np.abs(values[1:-1] - 0.5 * (before + after))
-        away[1:] = np.fmin(away[1:], np.abs(values[2:-1] - 2.0 * values[1:-2] + values[:-3]))
-        away[:-1] = np.fmin(away[:-1], np.abs(values[1:-2] - 2.0 * values[2:-1] + values[3:]))
-        limit = 10.0 * max(float(noise[k]), 0.02) + 2.0 * np.abs(after - before)
-        bad = np.flatnonzero(away > limit) + 1
-        # where a log ends or has a hole a spike also lifts its neighbours' distance: keep the largest of three in a row
-        peak = np.zeros(len(values))
-        peak[1:-1] = np.nan_to_num(away)
-        bad = bad[(peak[bad] >= peak[bad - 1]) & (peak[bad] >= peak[np.minimum(bad + 1, len(values) - 1)])]
-        if 0 < bad.size <= max(3, 0.01 * len(values)):
-            run.temperature_c[bad, k] = np.nan
+        whole = np.isfinite(values)
+        for stride in (1, 2, 4):  # so many rows are one of every stride-th
+            for begin in range(stride):
+                part = values[begin::stride]
+                part[_spikes(part, run.time_s[begin::stride], max(float(noise[k]), 0.02))] = np.nan
+        bad = np.flatnonzero(whole & np.isnan(values))
+        if bad.size:
             run.notes.append(
                 f"t{k + 1}_c: {bad.size} isolated spike(s) left out, the first at {run.time_s[bad[0]]:g} s"
             )
+
+
+def _spikes(values: np.ndarray, time_s: np.ndarray, noise: float) -> np.ndarray:
+    """Return which single values are spikes: far by what is usual around, for a thermometer may be restless for a while."""
+    import pandas as pd
+
+    if len(values) < 4:
+        return np.zeros(0, dtype=int)
+    before, after = values[:-2], values[2:]
+    away = np.abs(values[1:-1] - 0.5 * (before + after))
+    away[1:] = np.fmin(away[1:], np.abs(values[2:-1] - 2.0 * values[1:-2] + values[:-3]))
+    away[:-1] = np.fmin(away[:-1], np.abs(values[1:-2] - 2.0 * values[2:-1] + values[3:]))
+    usual = pd.Series(away).rolling(15, center=True, min_periods=1).median().to_numpy()
+    moved = np.abs(np.diff(values))
+    # where rows are far apart a spring comes a part of its way and goes again
+    goes = 0.5 * (time_s[2:] - time_s[:-2]) / QUICKEST_S * np.fmax(moved[1:], moved[:-1])
+    bad = np.flatnonzero(away > 10.0 * np.fmax(usual, noise) + 2.0 * np.abs(after - before) + goes) + 1
+    # where a log ends or has a hole a spike also lifts its neighbours' distance: keep the largest of three in a row
+    peak = np.zeros(len(values))
+    peak[1:-1] = np.nan_to_num(away)
+    return bad[(peak[bad] >= peak[bad - 1]) & (peak[bad] >= peak[np.minimum(bad + 1, len(values) - 1)])]
 
 
 def mend_first_reading(run: Run) -> None:
