@@ -325,7 +325,7 @@ def test_rows_here_and_there_that_are_missing_are_said(make_log) -> None:
     here = np.random.default_rng(0).random(600) > 0.1
     run = read_log(make_log(change=lambda columns: keep_rows(columns, here)))
     assert run.starts == [0]
-    assert any("rows are missing" in note for note in run.notes)
+    assert any("steps from row to row are longer than usual" in note for note in run.notes)
 
 
 def test_one_column_in_fahrenheit_is_refused_by_its_name_and_a_hot_start_is_not(make_log) -> None:

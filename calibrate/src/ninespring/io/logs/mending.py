@@ -310,9 +310,9 @@ def find_gaps(run: Run) -> None:
             f"{gaps.size} gap(s) in time, the longest {longest:.0f} s: the simulation starts again from the measured "
             f"temperatures after each, and what is measured in the first {RUN_IN_S:.0f} s does not count"
         )
-    missing = int(np.rint(step[(step > 1.5 * usual) & (step <= limit)] / usual - 1.0).sum())
-    if missing:
+    long = step[(step > 1.5 * usual) & (step <= limit)]
+    if long.size:
         run.notes.append(
-            f"about {missing} rows are missing here and there: an input that changed meanwhile is taken for the old one "
-            "until the next row"
+            f"{long.size} of {step.size} steps from row to row are longer than usual, up to {long.max():.3g} s: an input that changed "
+            "meanwhile is taken for the old one until the next row"
         )
