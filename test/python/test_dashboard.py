@@ -511,9 +511,15 @@ def test_a_refusal_says_what_would_be_right_and_to_which_wish(tmp_path: Path) ->
         for number, (wish, why) in enumerate(refused):
             got = answer_to(socket, wish | {"id": number})
             assert got["kind"] == "refused" and why in got["why"], got
-        for line, said in (("on 1.0 50", ""), ("off 1.", ""), ("on one 50", "defect"), ("?", "<off|t:12.340|")):
+        for line, said in (
+            ("on 1.0 50", ""),
+            ("on 1 30%", ""),
+            ("off 1.", ""),
+            ("on one 50", "defect"),
+            ("?", "<off|t:12.340|"),
+        ):
             got = answer_to(socket, {"do": "say", "line": line, "id": 99})
-            assert said in got.get("said", got.get("why"))
+            assert (got["kind"] == "refused") == (said == "defect") and said in got.get("said", got.get("why")), got
         assert answer_to(socket, {"do": "level", "spring": 1, "level": 5, "id": 100})["kind"] == "done"
     assert board.sent().count("version") == 1
     assert "!" not in board.sent()

@@ -311,7 +311,7 @@ class BoardSource(Source):
         word, *rest = line.lower().split()
         level = list(self._state["level"])
         if word in ("on", "off") and rest:
-            percent = float(rest[1]) if word == "on" and len(rest) > 1 else 100.0 * (word == "on")
+            percent = float(rest[1].removesuffix("%")) if word == "on" and len(rest) > 1 else 100.0 * (word == "on")
             for k in range(len(level)) if rest[0] == "all" else [int(float(rest[0])) - 1]:
                 level[k] = percent
         elif word == "pattern":
