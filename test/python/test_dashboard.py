@@ -679,6 +679,26 @@ def test_what_a_board_believes_reaches_the_page(tmp_path: Path) -> None:
         assert state["doing"] == ["not known for 75 s: it may still be hot from before power-on"]
 
 
+def test_springs_are_shown_as_off_by_their_faults_and_the_boards_not_by_a_remark(tmp_path: Path) -> None:
+    remarks = [
+        "thermistor: no room is as it says, 21.00 degC holds",
+        "found: supply 4.93 V, diodes 0.38 V +-0.03; declared: 5.00 V, 0.00 V",
+    ]
+    board = FakeBoard()
+    with page_of(board, tmp_path) as socket:
+        for faults, level in (
+            (remarks, 30),
+            (["spring 1: fault 15 sensor_mismatch", remarks[1]], 0),
+            (["supply: off"], 0),
+        ):
+            board.answers["faults"] = ["ok"]
+            awaited(socket, lambda state: state.get("faults") == [])
+            assert answer_to(socket, {"do": "level", "spring": 1, "level": 30, "id": 1})["kind"] == "done"
+            board.answers["faults"] = [*faults, "ok"]
+            state = awaited(socket, lambda state, last=faults[-1]: state.get("faults", [])[-1:] == [last])
+            assert state["level"] == [level], faults
+
+
 def test_a_sight_reaches_the_page_and_the_log_and_counts_as_no_corrupt_line(tmp_path: Path) -> None:
     board = FakeBoard()
     sight = "<sight|spring:1|t:96.250|lost|read:-1.32|read_sd:0.05|now_k:0.1|now_sd:1.0|shift_k:0.4|loss:1.20|heated|opened>"

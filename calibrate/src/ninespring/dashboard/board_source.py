@@ -32,6 +32,8 @@ LATE_S = 1.0
 """Telemetry that does not come for so long is asked for again."""
 ENDS_PLAYING = frozenset({"clear", "unlock", "cold", "end_play"})
 """What ends the list that is played, beside all that switches a spring."""
+ALL_OFF = ("locked", "supply: off", "board: ")
+"""How `faults` begins a line by which no spring is driven; what is no spring's and none of these is a remark."""
 
 
 UNKNOWN = dict.fromkeys(("bounds_c", "phase", "unknown_s", "target_a", "measured_c"))
@@ -358,7 +360,7 @@ class BoardSource(Source):
         for one in faults:
             if spring := re.match(r"spring (\d+): ", one):
                 level[int(spring[1]) - 1] = 0
-            else:
+            elif one.startswith(ALL_OFF):
                 level = [0] * len(level)
         shown = [
             re.sub(r"fault (\d+) \w+", lambda match: f"{words.FAULTS.get(int(match[1]), match[0])}", one)
