@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command import process
-from fake_board import FakeBoard, row
+from fake_board import TELEMETRY, FakeBoard, row
 from made import ROOT, needs_board
 from ninespring.dashboard import server, source
 from ninespring.io import words
@@ -677,6 +677,29 @@ def test_what_a_board_believes_reaches_the_page(tmp_path: Path) -> None:
         state = awaited(socket, lambda state: state.get("unknown_s", [None])[0])
         assert state["unknown_s"] == [75.0] and state["target_a"] == [0.0]
         assert state["doing"] == ["not known for 75 s: it may still be hot from before power-on"]
+
+
+def test_an_array_of_another_size_is_shown_and_driven_as_that(tmp_path: Path) -> None:
+    board = FakeBoard()
+    board.settings = {"rows": "1", "columns": "1"}
+    with page_of(board, tmp_path) as socket:
+        assert answer_to(socket, {"do": "record", "id": 1})["kind"] == "done"
+        awaited(socket, lambda state: (state.get("recording") or {}).get("rows"))
+        board.answers["telemetry csv 10"] = [TELEMETRY.replace(",fan", ",i2_a,v2_v,m2_c,fan"), "ok"]
+        assert answer_to(socket, {"do": "set", "name": "rows", "value": "2", "id": 2})["kind"] == "done"
+        state = awaited(socket, lambda state: state.get("springs") == 2)
+        assert (state["rows"], state["cols"], state["recording"]) == (2, 1, None) and state["connected"]
+        assert state["temperature_c"] == [None, None]
+        for k in range(3):
+            board.say(row(90000.0 + 0.1 * k).replace(",0.00,", ",0.500,0.100,21.00,0.00,"))
+        awaited(socket, lambda state: state.get("temperature_c") == [20.0, 21.0])
+        assert answer_to(socket, {"do": "pattern", "springs": "01", "id": 3})["kind"] == "done"
+        own = f"http://{socket.request.headers['host']}"
+        with connect(f"{own.replace('http', 'ws')}/ws", additional_headers={"origin": own}) as later:
+            assert len(awaited(later, lambda told: told["kind"] == "history")["current_a"]) == 2
+    (log,) = tmp_path.iterdir()
+    assert log.suffix == ".csv" and len(read_table(log).frame)
+    assert board.sent().count("version") == 1
 
 
 def test_springs_are_shown_as_off_by_their_faults_and_the_boards_not_by_a_remark(tmp_path: Path) -> None:

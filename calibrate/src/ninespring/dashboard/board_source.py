@@ -37,6 +37,7 @@ ALL_OFF = ("locked", "supply: off", "board: ")
 
 
 UNKNOWN = dict.fromkeys(("bounds_c", "phase", "unknown_s", "target_a", "measured_c"))
+UNKNOWN |= dict.fromkeys(("current_a", "voltage_v", "temperature_c", "duty", "power_w"))
 UNKNOWN |= {"level": 0, "doing": "", "limits": (), "cut_a": 0.0, "sights": 0}
 """What is shown of each spring before anything is known of it."""
 
@@ -226,21 +227,8 @@ class BoardSource(Source):
         board.guard(self._settings)
         if logger := self._thermometers_port or board.thermometers:
             self._thermometers = Thermometers(logger)
-        self._names = names = board.telemetry(self._hz)
-        self._check = RowCheck(names, self._hz)
-        springs = springs_in(names)
-        rows, columns = shape_of(self._settings, springs)
-        self._change(
-            connected=True,
-            trouble="",
-            version=board.version,
-            rows=rows,
-            cols=columns,
-            springs=springs,
-            every_s=1.0 / self._hz,
-            faults=[],
-            **{name: [empty] * springs for name, empty in UNKNOWN.items()},
-        )
+        self._show(board.telemetry(self._hz))
+        self._change(connected=True, trouble="", version=board.version)
         self._board = board
         heard_s = look_s = time.monotonic()
         again_s = heard_s + LATE_S * board.patience
@@ -265,6 +253,23 @@ class BoardSource(Source):
                 again_s += LATE_S * board.patience
                 with contextlib.suppress(RefusedError):
                     board.telemetry(self._hz)
+
+    def _show(self, names: list[str]) -> None:
+        """Show as many springs as these columns of telemetry are of, and nothing of them yet."""
+        self._names, self._check = names, RowCheck(names, self._hz)
+        springs = springs_in(names)
+        rows, columns = shape_of(self._settings, springs)
+        if springs != self._state.get("springs"):
+            with self._lock:
+                self._forget()
+        self._change(
+            rows=rows,
+            cols=columns,
+            springs=springs,
+            every_s=1.0 / self._hz,
+            faults=[],
+            **{name: [empty] * springs for name, empty in UNKNOWN.items()},
+        )
 
     def _read_settings(self, board: Board) -> None:
         self._settings = board.as_lent(board.settings())
@@ -331,7 +336,10 @@ class BoardSource(Source):
     def _need_of(self, board: Board) -> None:
         """Have the board do what this page needs of it."""
         board.guard(self._settings)
-        board.telemetry(self._hz)
+        if (names := board.telemetry(self._hz)) != self._names:
+            self._play = None
+            self._end_recording("")
+            self._show(names)
 
     def _play_on(self, board: Board, now: float) -> None:
         play = self._play

@@ -271,7 +271,7 @@ function thin() {
 
 function append(now) {
   const last = past.time_s.at(-1);
-  if (last !== undefined && now.time_s < last) {
+  if (last !== undefined && (now.time_s < last || now.springs !== past.each.current_a.length)) {
     past.time_s = [];
     past.each = {};
     past.sum_a = [];
