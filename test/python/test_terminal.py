@@ -125,6 +125,17 @@ def test_what_is_typed_is_completed_sent_and_answered_and_a_stop_acts_as_it_is_p
     assert "+telemetry csv 1" in history.read_text()
 
 
+def test_settings_are_read_anew_by_nobody_else_and_what_is_refused_is_none() -> None:
+    fake = FakeBoard({"help": [*HELP, "ok"], "$loss_w_per_k=9": ["error:5 a number is out of range"]})
+    fake.settings = SETTINGS | {f"scale_{k}": "1.000" for k in range(100)}
+    typed = ["$defaults\r"] * 3 + ["$loss_w_per_k=9\r", "$loss_w_per_k", "\r", "faults\r"]
+    code, seen = at_a_terminal(fake.port, typed, r"0\.005800(?s:.)*ok(?s:.)*ok")
+    assert code == 0, seen
+    assert "$scale_" not in seen  # the answer to `$$` is the completion's
+    assert "$loss_w_per_k=0.005800" in seen and "error 5" in seen and "$loss_w_per_k=9  " not in seen
+    assert fake.sent().count("$$") == 4 and fake.sent().count("faults") == 1
+
+
 def test_lines_from_a_pipe_are_answered_one_after_the_other() -> None:
     fake = FakeBoard({"faults": ["spring 2: fault 2 open", "ok"], "on 99": ["error:5 out of range", "ok"][:1]})
     done = alone("console", "--port", fake.port, input="faults\n\n?\n")

@@ -143,26 +143,32 @@ class Talk:
         self._board.stop_now()
         self._show("! everything off; `clear` goes on")
 
-    def say(self, line: str) -> None:
-        """Send a line and print its answer as the board gave it; what is refused is counted."""
+    def settings(self) -> dict[str, str]:
+        """Return the board's settings."""
+        with self._lock:
+            return self._board.settings()
+
+    def say(self, line: str) -> bool:
+        """Send a line and print its answer as the board gave it; what is refused is counted. True where the board took it."""
         if "!" in line:
             self.stop()
-            return
+            return False
         try:
             with self._lock:
                 asked = line.strip() == "?"
                 answer = [self._board.status()] if asked else [*self._board.ask(line, LONGEST_S), "ok"]
+            took = True
         except KeyboardInterrupt:
             self.stop()
-            return
+            return False
         except RefusedError as error:
-            self.refused += 1
-            answer = [*error.said, error.refusal]
+            took, answer = False, [*error.said, error.refusal]
         except (WorkError, InputError) as error:
-            self.refused += 1
-            answer = [str(error)]
+            took, answer = False, [str(error)]
+        self.refused += not took
         for one in answer:
             self._show(one)
+        return took
 
 
 def talk_at_a_terminal(board: Board) -> None:
@@ -197,10 +203,11 @@ def talk_at_a_terminal(board: Board) -> None:
                 break
             if line in ENDS:
                 break
-            if line:
-                talk.say(line)
-            if line.startswith("$") and ("=" in line or line == "$defaults"):
-                known.settings |= board.settings() if line == "$defaults" else dict([line[1:].split("=", 1)])
+            if not line or not talk.say(line):
+                continue
+            name, equals, value = line[1:].lower().partition("=")
+            if line.startswith("$") and (equals or name == "defaults"):
+                known.settings |= {name: value} if equals else talk.settings()
         talk.ends.set()
         listener.join(2)
     if talk.trouble:
