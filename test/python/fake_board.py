@@ -27,6 +27,8 @@ class FakeBoard:
         self.answers = {"version": VERSION, "faults": ["ok"]} | (answers or {})
         self.seen: list[str] = []
         self.settings: dict[str, str] = {}
+        self.saved: dict[str, str] = {}
+        """As they were at `$save`."""
         self.stream = stream
         """Lines that follow the answer to `telemetry csv`, until `telemetry off` or a pull; `FAULT ...`: latched from then on."""
         self.every_s = every_s
@@ -104,8 +106,8 @@ class FakeBoard:
         self._busy = self.answers.get(text) == []
         if text.startswith("telemetry csv") and text not in self.answers:
             self.say(TELEMETRY, "ok")
-            if "telemetry_hz" in self.settings:
-                self.settings["telemetry_hz"] = text.split()[2]
+            now = {"telemetry_hz": text.split()[2], "telemetry_format": "1"}
+            self.settings |= {name: value for name, value in now.items() if name in self.settings}
             self._streaming = len(self.seen)
             threading.Thread(target=self._stream, args=(self._streaming,), daemon=True).start()
         elif text in self.answers:
@@ -117,6 +119,8 @@ class FakeBoard:
         elif text:
             if text == "telemetry off":
                 self._streaming = 0
+            if text.lower() == "$save":
+                self.saved = dict(self.settings)
             if text.startswith("$") and "=" in text:
                 self.settings.__setitem__(*text[1:].split("=", 1))
             self.say("ok")

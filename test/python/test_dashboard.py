@@ -450,7 +450,7 @@ def test_foreign_pages_are_refused_and_malformed_messages_change_nothing(tmp_pat
             assert answer_to(socket, {"do": "level", "spring": 1, "level": 50, "id": 7})["kind"] == "done"
         with dashboard.page() as socket:
             socket.send(b"\x00\x01")  # not text: this page is gone, nobody else's
-        asked = ("version", "echo off", "telemetry off", "$$", "$telemetry_hz", "model", "faults")
+        asked = ("version", "echo off", "telemetry off", "$$", "$telemetry_hz", "$telemetry_format", "model", "faults")
         assert [line for line in board.sent() if line not in asked] == ["telemetry csv 10", "on 1 50"]
     assert "off all" in board.sent()
 

@@ -379,13 +379,17 @@ def test_a_host_that_was_held_up_does_not_blame_the_board(tmp_path: Path) -> Non
 
 def test_settings_of_the_board_that_recording_needs_otherwise_are_given_back(tmp_path: Path) -> None:
     board = FakeBoard(stream=STREAM, every_s=0.3)
-    board.settings = {"host_timeout_s": "0", "telemetry_hz": "7"}
-    assert record(board, tmp_path, "--duration", 4).returncode == 0
+    own = {"host_timeout_s": "0", "telemetry_hz": "7", "telemetry_format": "0"}
+    board.settings = dict(own)
+    (tmp_path / "steps.txt").write_text("at 1 = $Save\nat 2 = $loss_w_per_k\n")
+    assert record(board, tmp_path, "--duration", 4, "--run", tmp_path / "steps.txt").returncode == 0
+    assert board.saved == own  # what is kept is what was set, not what recording needs
     sent = board.sent()
     begins, ends = sent.index("$host_timeout_s=5"), sent.index("$host_timeout_s=0")
-    assert begins < sent.index("telemetry csv 20") < sent.index("off all") < ends
+    assert begins < sent.index("telemetry csv 20") < ends < sent.index("$Save") < sent.index("off all")
+    assert "$host_timeout_s=5" in sent[sent.index("$Save") : sent.index("$loss_w_per_k")]
     assert {"# $host_timeout_s=0", "# $telemetry_hz=7"} <= set((tmp_path / "log.csv").read_text().splitlines())
-    assert board.settings == {"host_timeout_s": "0", "telemetry_hz": "7"}
+    assert board.settings == own
     # something goes to the board all the while, so that it knows that this end lives
     assert "" in board.seen[board.seen.index("telemetry csv 20") : board.seen.index("off all")]
 

@@ -303,13 +303,7 @@ class BoardSource(Source):
         line = _line(wish)
         if line == "?":
             return board.status()
-        if line == "$save":
-            board.give_back()  # what is saved is what was set, not what this page needs
-        try:
-            said = board.ask(line, 10.0)
-        finally:
-            if line == "$save":
-                self._need_of(board)
+        said = board.ask(line, 10.0)
         self._note(board, line)
         return "\n".join(said)
 

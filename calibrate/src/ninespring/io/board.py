@@ -33,6 +33,8 @@ FOUND_WITHIN_S = 5.0
 """So soon a board is found, or it is said that there is none."""
 BOOTING_S = 2.0
 """A Mega's boot loader listens for so long after a reset, and takes what is sent meanwhile for a program."""
+CSV = 1
+"""What `telemetry csv` makes of `telemetry_format`."""
 SIMULATED = "simulated"
 PATIENCE = 6.0
 """So many times longer an answer of the simulated board is awaited: it has what the machine leaves it."""
@@ -45,6 +47,7 @@ LOOK_EVERY_S = 1.0
 SCRIPT_ALIVE_EVERY_S = 0.2
 """For a script that may sleep or compute between two lines: a simulated board's second may be so short."""
 DRIVES = re.compile(r"\s*(on|pattern)\b", re.IGNORECASE)
+SAVES = re.compile(r"\s*\$save\s*", re.IGNORECASE)
 STATUS = re.compile(r"^<(off|on|fault|locked)\|t:.*>$")
 """What `?` is answered with."""
 CLOCK = re.compile(r"(?P<row_s>\d+\.\d+),|~S(?P<tick>[0-9A-F]{4})")
@@ -189,8 +192,12 @@ class Board:
     def ask(self, line: str, timeout_s: float = 3.0) -> list[str]:
         """Send one line; return the answer's lines. WorkError where it is refused, or nothing of it comes for so long.
 
-        Telemetry that comes meanwhile is kept for `next_line`.
+        Telemetry that comes meanwhile is kept for `next_line`. What `$save` keeps is what was set, not what this program needs
+        for a while.
         """
+        if self._lent and SAVES.fullmatch(line):
+            with self._given_back():
+                return self.ask(line, timeout_s)
         if not re.fullmatch("[ -~]+", line):
             raise InputError(f"{line[:40]!r} is not one line of plain ASCII")
         if re.search("[!?]", line):
@@ -252,6 +259,7 @@ class Board:
         """
         if not (again and "telemetry_hz" in self._lent):
             self._borrow("telemetry_hz", hz, self._setting("telemetry_hz"))
+            self._borrow("telemetry_format", CSV, self._setting("telemetry_format"))
         for _ in range(3):
             if names := next(filter(None, map(telemetry_names, self.ask(f"telemetry csv {hz}"))), None):
                 return names
@@ -333,11 +341,23 @@ class Board:
                 self.ask(f"${name}={self._lent[name][0]}", 1.0)
                 del self._lent[name]
 
+    @contextlib.contextmanager
+    def _given_back(self) -> Iterator[None]:
+        """Have the board's own settings for so long."""
+        lent = dict(self._lent)
+        self.give_back()
+        try:
+            yield
+        finally:
+            for name, (_, here) in lent.items():
+                self.ask(f"${name}={here}")
+            self._lent = lent
+
     def telemetry_off(self, timeout_s: float = 3.0) -> None:
         """End telemetry; the board's own rate is what it was."""
         self.ask("telemetry off", timeout_s)
         self._telemetry.clear()
-        self.give_back("telemetry_hz")
+        self.give_back("telemetry_hz", "telemetry_format")
 
     def make_safe(self) -> bool:
         """Switch telemetry and all springs off; True where the board confirms it. Never raises, and nothing stops it."""
