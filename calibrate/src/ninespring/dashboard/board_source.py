@@ -194,6 +194,7 @@ class BoardSource(Source):
                         self._converse(board)
                     finally:
                         self._board = None
+                        self._change(connected=False)  # nothing can be wished while it is made safe
                         self._end_recording("")
                         if self._thermometers:
                             self._thermometers.close()

@@ -236,6 +236,7 @@ async def _carry_out(source: Source, wish: dict[str, Any], rate: _Rate, answers:
     answer = asyncio.wrap_future(source.do(wish))
     if not off:
         return await asyncio.wait_for(answer, ANSWER_S)
+    answer.add_done_callback(lambda late: late.cancelled() or late.exception())  # when nobody waits for it any more
     try:
         return await asyncio.wait_for(asyncio.shield(answer), source.off_within_s)
     except TimeoutError:
