@@ -145,6 +145,7 @@ def test_a_full_device_is_said_and_switches_off(tmp_path: Path) -> None:
     [
         ([row(7.0), row(7.5), row(8.0), row(0.5), row(1.0), row(1.5)], "started again", [7.0, 7.5, 8.0]),
         (STREAM[:3], "no telemetry for 1 s", [0.5, 1.0, 1.5]),
+        (STREAM[:3] + [">i1:500:1.0"] * 30, "21 lines in a row that are no rows", [0.5, 1.0, 1.5]),
     ],
 )
 def test_a_board_that_starts_again_or_falls_silent_ends_the_recording(
@@ -250,6 +251,8 @@ def test_a_step_that_the_board_refuses_ends_the_recording(tmp_path: Path) -> Non
         ("on 1\nat 5 = on 2\non 3\n", ":3:1: "),
         ("at 5 = on 1\nat 4 = on 2\n", ":2:1: "),
         ("fan ä\n", ":1:1: "),
+        ("on 1\nat 5 = on\t2\n", ":2:1: 'on\\t2' is not one line of plain ASCII"),
+        ("at 5 = !\n", ":1:1: '!': ! and ? act at once"),
         ("at 5 = on 1\nat 900 = off all\n", ":2:1: "),
         ("# later\n", ": no step in it\n"),
     ],

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from command import ninespring as run
-from fake_board import FakeBoard
+from fake_board import FakeBoard, row
 from ninespring.io.simulated import simulator
 from test_dashboard import needs_board
 
@@ -70,8 +70,19 @@ def test_ticks_that_are_lost_on_the_way_are_said(tmp_path: Path) -> None:
     board = FakeBoard({"telemetry inputs": ["<start|ambient_c7:2560|fan:0>", "ok"]})
     tape = tmp_path / "day.tape"
     numbers = [0xFFFE, 0xFFFF, 0, 1, 5, 6, 9, *range(10, 200)]
-    threading.Timer(1.5, lambda: board.say(*(f"~S{number:04X}0A00" for number in numbers))).start()
+    lines = [f"~S{number:04X}0A00" for number in numbers]
+    lines.insert(8, "~Sz0A00")  # what is left of a tick is none
+    threading.Timer(1.5, lambda: board.say(*lines)).start()
     got = run("record", "--port", board.port, "--tape", "--duration", "1", "-o", tape)
     assert got.returncode == 1
     assert "5 ticks were lost on the way here, the first after 0.1 s" in got.stdout + got.stderr
     assert "\n# ended: 5 ticks were lost" in tape.read_text()
+
+
+def test_what_is_no_tape_does_not_go_on_for_ever(tmp_path: Path) -> None:
+    board = FakeBoard({"telemetry inputs": ["<start|ambient_c7:2560|fan:0>", "ok"]})
+    threading.Timer(1.5, lambda: board.say("~S00010A00", *[row(1.0)] * 260)).start()
+    got = run("record", "--port", board.port, "--tape", "--duration", "1", "-o", tmp_path / "day.tape")
+    assert got.returncode == 1
+    assert "251 lines in a row that are no ticks of the tape" in got.stderr
+    assert "off all" in board.sent()

@@ -91,12 +91,15 @@ def script_lines(text: str, name: str, duration_s: float = math.inf) -> list[Ste
         line = re.split("[#;]", raw, maxsplit=1)[0].strip()
         if not line:
             continue
-        if not line.isascii():
-            raise InputError("the console takes plain ASCII", name, number, 1)
         match = re.fullmatch(r"at\s+(\d+(?:\.\d*)?)\s*=\s*(\S.*)", line)
         at_s, before_s = float(match[1]) if match else None, steps[-1].at_s if steps else None
+        sent = match[2] if match else line
         wrong = ""
-        if at_s is None and re.match(r"at\b", line):
+        if not re.fullmatch("[ -~]+", sent):
+            wrong = f"{sent[:40]!r} is not one line of plain ASCII, as the console takes it"
+        elif re.search("[!?]", sent):
+            wrong = f"'{sent[:40]}': ! and ? act at once, as they are typed: they are no step"
+        elif at_s is None and re.match(r"at\b", line):
             wrong = f"'{line[:40]}' is not `at SECONDS = console line`"
         elif at_s is None and before_s is not None:
             wrong = f"'{line[:40]}' comes after timed lines: give it a time, `at SECONDS = ...`"
@@ -106,7 +109,7 @@ def script_lines(text: str, name: str, duration_s: float = math.inf) -> list[Ste
             wrong = f"{at_s:g} s is not before the end of the recording, `--duration {duration_s:g}`"
         if wrong:
             raise InputError(wrong, name, number, 1)
-        steps.append(Step(match[2] if match else line, at_s, f"{name}:{number}:1: "))
+        steps.append(Step(sent, at_s, f"{name}:{number}:1: "))
     return steps
 
 
@@ -358,6 +361,8 @@ class _UnderWay:
         self.sink.begin(names)
         check = RowCheck(names, hz)
         state, time_s, first_s = "ok", None, math.nan
+        no_rows = 0
+        """Lines in a row that were none of telemetry."""
         while True:
             line = self.board.next_line(time.monotonic() + SILENT_S)
             if line is None:
@@ -371,6 +376,9 @@ class _UnderWay:
             self.got.dropped = check.dropped
             if check.restarted:
                 raise WorkError("the board has started again")
+            no_rows = 0 if good else no_rows + bool(line)
+            if no_rows > SILENT_S * hz:
+                raise WorkError(f"{self.board.port}: {no_rows} lines in a row that are no rows of its telemetry")
             for row in good:
                 first_s = row.time_s if math.isnan(first_s) else first_s
                 if row.time_s - first_s > duration_s:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 
 from ..errors import RefusedError, WorkError
-from .board import Board
+from .board import CLOCK, Board
 from .recording import SILENT_S, LogFile, Recording, Step, switched_off_after, write_end, write_head
 
 TICK_S = 0.02
@@ -29,7 +29,7 @@ def record_tape(
     are sent when the tape has begun. Whatever ends it, the springs are off afterwards.
     """
     got, steps = Recording(), list(steps)
-    last, lost, lost_s, time_s = None, 0, 0.0, 0.0
+    last, lost, lost_s, time_s, no_ticks = None, 0, 0.0, 0.0, 0
     with switched_off_after(board, got):
         board.guard(write_head(board, log, keys or {}))
         try:
@@ -40,8 +40,12 @@ def record_tape(
             line = board.next_line(time.monotonic() + board.patience * SILENT_S)
             if line is None:
                 raise WorkError(f"{board.port}: nothing came for {board.patience * SILENT_S:g} s")
-            if line.startswith("~S"):
-                tick = int(line[2:6], 16)
+            came = CLOCK.match(line)
+            no_ticks = 0 if came and came["tick"] else no_ticks + bool(line)
+            if no_ticks > SILENT_S / TICK_S:
+                raise WorkError(f"{board.port}: {no_ticks} lines in a row that are no ticks of the tape")
+            if came and came["tick"]:
+                tick = int(came["tick"], 16)
                 if last is not None and tick != (last + 1) % COUNTED:
                     lost_s = lost_s if lost else TICK_S * log.rows
                     lost += (tick - last - 1) % COUNTED
