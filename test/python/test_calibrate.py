@@ -7,11 +7,13 @@ import signal
 import subprocess
 import time
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from command import alone, ended, process
-from fake_board import FakeBoard
+from fake_board import FakeBoard, row
 from made import needs_board, simulated_board
 from ninespring.cli.calibrate import FROM
 from ninespring.cli.calibration import chain, judged
@@ -236,6 +238,7 @@ def until_export(
 
     found = iter(drives)
     monkeypatch.setattr(Calibration, "_drive", drive)
+    monkeypatch.setattr(Calibration, "_cool", lambda self: self.board.ask("model cold"))
     monkeypatch.setattr(Calibration, "model", lambda self: None)
     monkeypatch.setattr(judged, "judge", lambda model, log, pattern: next(found))
     return told
@@ -263,12 +266,34 @@ def test_settings_are_saved_if_the_board_drives_no_worse_with_them_and_taken_bac
     ended = told.run()
     assert says in ended and bool(says) == bool(ended)
     assert told.fake.settings == (HAD if says else HAD | FOUND)
-    assert ("$save" in told.fake.sent()) == (not says)
+    sent = told.fake.sent()
+    assert ("$save" in sent) == (not says)
+    assert sent.index("model cold") < sent.index("learnt clear")  # of warm springs no larger loss is believed
     assert ((tmp_path / "before.csv").read_text(), (tmp_path / "after.csv").read_text()) == ("0.005800", "0.006100")
     assert bool(told.progress.data["refused"]) == bool(says)
     # asked again it says the same, and drives nothing
     again = Told(tmp_path)
     assert says in again.run() and not again.asked
+
+
+def test_springs_are_cold_once_the_board_that_heated_them_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = Told(tmp_path)
+    told.fake.stream = (row(float(k)) for k in range(1, 999))
+    warm, asked, ask = ["[spring 1 was heated 199 s ago: 27 degC or more]"], [], told.board.ask
+
+    def answer(line: str, timeout_s: float = 3.0) -> list[str]:
+        if line != "model cold":
+            return ask(line, timeout_s)
+        asked.append(line)
+        return warm if len(asked) < 4 else []
+
+    monkeypatch.setattr(told.board, "ask", answer)
+    monkeypatch.setattr(told.chain, "_logger", lambda: nullcontext(SimpleNamespace(latest={1: 20.0})))
+    told.chain._cool()
+    told.board.close()
+    assert len(asked) == 4
 
 
 def test_a_stop_between_upload_and_save_gives_the_board_its_own_settings(
