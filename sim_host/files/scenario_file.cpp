@@ -213,7 +213,7 @@ public:
         } else if (first == "ambient") {
             event.word = scenario_word::ambient;
             count(2, 2, "ambient DEGC");
-            event.amount = amount(words_[1], -40.0, 85.0);
+            event.amount = amount(words_[1], -40.0, 50.0); /* as ambient_c, which it tells */
         } else if (first == "room") {
             event.word = scenario_word::room;
             count(2, 2, "room DEGC");
