@@ -118,6 +118,12 @@ def test_a_diode_that_drops_more_than_declared_is_told_from_a_low_supply(bench: 
     assert made.finds("channels") == []
 
 
+def test_a_stage_that_may_give_less_is_tested_with_that(bench: Make) -> None:
+    made = bench()
+    made.board.ask("$maximum_current_a=1.1")
+    assert [found for step in ("channels", "spring", "springs") for found in made.finds(step)] == []
+
+
 def test_from_nothing_to_nine_springs(bench: Make, tmp_path: Path) -> None:
     """As docs/building.md walks: what hands do between the steps is done when it is asked for."""
     made, page = bench(), tmp_path / "bringup.html"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -112,6 +112,11 @@ def springs_with(faults: Iterable[str], *numbers: int) -> set[int]:
 def jumpers(spring: int) -> str:
     """Return the address of a spring's sensor and what its pads lead to."""
     return f"0x{0x3F + spring:02X} (A1 to {JUMPERS[(spring - 1) // 4]}, A0 to {JUMPERS[(spring - 1) % 4]})"
+
+
+def tested_a(settings: Mapping[str, str]) -> float:
+    """Return the current that this board's channels are tested with: TEST_A, or as much as one spring may have."""
+    return min(TEST_A, float(settings["maximum_current_a"]))
 
 
 def springs_of(board: Board) -> int:
@@ -330,6 +335,7 @@ def step_channels(board: Board, step: Step, hands: Hands | None) -> None:
     """Each channel by itself, on its resistor."""
     springs = springs_of(board)
     settings = board.settings()
+    wanted_a = tested_a(settings)
     make_ready(board)
     rest = np.array([one.current_a for one in rows(board, 0.2)])
     for k in sorted(Driven(rest, [], [], board.ask("faults")).others(0)):
@@ -344,7 +350,7 @@ def step_channels(board: Board, step: Step, hands: Hands | None) -> None:
         noise = 1e3 * float(np.std([one.current_a[k - 1] for one in got.settled] or [0.0]))
         text = f"{own[0]:.3f} A, {own[1]:.3f} V, {got.ohm(k):.3f} ohm, duty {own[2]:.3f}, noise {noise:.0f} mA"
         text = text if own[0] > NOTHING_A else "no current"
-        step.tell(f"channel {k}", text, f"{TEST_A:g} A, {TEST_A * DUMMY_OHM:.3f} V, {DUMMY_OHM:g} ohm")
+        step.tell(f"channel {k}", text, f"{wanted_a:g} A, {wanted_a * DUMMY_OHM:.3f} V, {DUMMY_OHM:g} ohm")
     if all(got.current_a.max() < NOTHING_A and not springs_with(got.faults, 11, 15) for _, got in driven):
         step.found.append(
             "no channel has current: the supply is off, its fuse is open, or the relay does not hold (D12 to the pump; docs/hardware.md)"
@@ -448,7 +454,7 @@ def step_one_spring(board: Board, step: Step, hands: Hands | None) -> None:
     power = float(np.mean([one.current_a[0] * one.voltage_v[0] for one in heat] or [0.0]))
     seconds = seen[-1].time_s - begun.time_s
     ohms = np.array([one.voltage_v[0] / one.current_a[0] for one in heat][5:] or [float("nan")])
-    wanted = TEST_A**2 * declared
+    wanted = tested_a(settings) ** 2 * declared
     step.numbers += [
         ("heated with", f"{power:.3f} W for {seconds:.1f} s", f"{wanted:.3f} W within a third"),
         (
@@ -491,17 +497,17 @@ def step_all_springs(board: Board, step: Step, hands: Hands | None) -> None:
     faults = board.ask("faults")
     board.ask("off all")
     last = np.mean([one.current_a for one in together[-ROWS_HZ:]], axis=0)
-    share = min(1.0, float(settings["supply_limit_a"]) / (springs * TEST_A))
+    wanted_a = min(tested_a(settings), float(settings["supply_limit_a"]) / springs)
     step.tell(
         "all together",
         f"{last.sum():.2f} A, {last.min():.3f} to {last.max():.3f} A each",
-        f"{share * TEST_A:.2f} A each",
+        f"{wanted_a:.2f} A each",
     )
     step.found += faults
-    if not faults and abs(last - share * TEST_A).max() > 0.1:
-        k = int(abs(last - share * TEST_A).argmax())
+    if not faults and abs(last - wanted_a).max() > 0.1:
+        k = int(abs(last - wanted_a).argmax())
         step.found.append(
-            f"with all of them on, spring {k + 1} gets {last[k]:.3f} A, not {share * TEST_A:.2f}: the supply's wires"
+            f"with all of them on, spring {k + 1} gets {last[k]:.3f} A, not {wanted_a:.2f}: the supply's wires"
         )
 
 
@@ -585,7 +591,7 @@ def do_step(board: Board, name: str, hands: Hands | None) -> Step:
     settings = board.settings()
     board.ask("off all")
     board.ask("policy open")
-    board.ask(f"$open_current_a={TEST_A}")
+    board.ask(f"$open_current_a={tested_a(settings)}")
     try:
         STEPS[name].do(board, step, hands)
     finally:
