@@ -335,19 +335,16 @@ private:
 
     void failure(scenario_event &event) const
     {
-        std::vector<std::string> names;
+        std::string known;
         const failure_word *found = nullptr;
         for (const failure_word &one : FAILURES) {
-            names.emplace_back(one.name);
+            known += (known.empty() ? "" : ", ") + std::string(one.name) + one.after;
             if (words_.size() >= 2 && words_[1] == one.name) {
                 found = &one;
             }
         }
         if (found == nullptr) {
-            throw wrong(fmt::format("{} what? open, short, nack, stale, freeze, lie or ina_reset "
-                                    "with a spring, swap with two, sda_low, brown_out or fan_stop "
-                                    "without",
-                                    words_[0]));
+            throw wrong(fmt::format("{} what? {}", words_[0], known));
         }
         if (event.word == scenario_word::repair && !found->lasts) {
             throw wrong(fmt::format("{} is over at once; there is nothing to repair", found->name));
