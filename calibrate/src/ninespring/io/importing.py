@@ -366,6 +366,7 @@ def merge_into_log(
             log_path,
         )
     merged = {name: table.frame[name] for name in table.names if name != "time_s"}
+    longest_s = longest_step(when)
     for name, values in columns.items():
         good = np.isfinite(values)
         merged[name] = line = (
@@ -374,6 +375,6 @@ def merge_into_log(
             else np.full(len(time_s), np.nan)
         )
         for before, after in itertools.pairwise(when[good]):
-            if after - before > longest_step(when):
+            if after - before > longest_s:
                 line[(time_s > before) & (time_s < after)] = np.nan
     return log_text(time_s, merged, table.keys | {"temperatures_from": "camera frames"}, 5)
