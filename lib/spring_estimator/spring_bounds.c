@@ -46,15 +46,14 @@ spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
             SPRING_ESTIMATOR_NEIGHBOUR_SD * (now_c - spring_ambient_c(model));
         others_k2 = TRUST_SD_K * TRUST_SD_K + neighbours_k * neighbours_k;
     }
-    const float told_k2 = spring_distance_k2(b) + others_k2;
-    float warmer_k = 0.0f;
+    const float told_k = SPRING_ESTIMATOR_BOUND_SDS * sqrtf(spring_distance_k2(b) + others_k2);
+    float hotter_k = told_k;
     if (b->possible == SPRING_PHASE_AUSTENITE) { /* losses that fell show in nothing: it holds */
-        warmer_k = LOSS_SD * spring_above_ambient_k(model, k);
+        const float warmer_k = LOSS_TOLERANCE * spring_above_ambient_k(model, k);
+        hotter_k = sqrtf(told_k * told_k + warmer_k * warmer_k);
     }
-    const spring_bounds_t bounds = disturbed(b, spring_around(now_c, sqrtf(told_k2)));
-    const spring_bounds_t hot =
-        disturbed(b, spring_around(now_c, sqrtf(told_k2 + warmer_k * warmer_k)));
-    return (spring_bounds_t){now_c, bounds.low, hot.high + fmaxf(b->gone_k, 0.0f)};
+    return disturbed(
+        b, (spring_bounds_t){now_c, now_c - told_k, now_c + hotter_k + fmaxf(b->gone_k, 0.0f)});
 }
 
 spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *e,
