@@ -70,13 +70,13 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "swarm",
         "Worlds that nobody listed: everything drawn at once",
-        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2907",
+        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2908",
         markdown=True,
     ),
     Section(
         "board_swarm",
         "The board in everything at once",
-        f"{HOST}/bench/swarm/bench_swarm --runs 536 --seed 7400000 --resume build/results/board_swarm.txt",
+        f"{HOST}/bench/swarm/bench_swarm --runs 400 --seed 7402000 --resume build/results/board_swarm.txt",
     ),
     Section("flips", "Bits that turn over", f"{HOST}/bench/swarm/bench_flips --runs 50 --boards 40 --seed 8001"),
     Section("mutate", "What the tests notice", "script/mutate"),
