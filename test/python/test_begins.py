@@ -1,10 +1,13 @@
-"""How a run began, as far as nobody logged it: what is around springs that were hot."""
+"""How a run began, as far as nobody logged it: what is around springs that were hot, and what phase they are."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 from ninespring.infer import predict as prediction
+from ninespring.io.logs import log_text, read_log
 from ninespring.io.logs.run import Run
 from ninespring.model import native
 from ninespring.model.models import Array, Model
@@ -60,3 +63,64 @@ def test_a_box_that_loses_next_to_nothing_is_as_warm_as_it_would_be_after_days()
     model, run = cooling({"shared_air": kept | {"air_exchange_w_per_k": 1.0}})
     model.parameters |= kept
     assert np.isfinite(prediction.predict(model, run)).all()
+
+
+FULL_W = 0.9
+MARTENSITE_OHM, AUSTENITE_OHM = 0.175, 0.219
+FROM_S = 20
+ROW = np.arange(900)
+
+
+def cut(path: Path, full_s: int, after_w: float, keep: np.ndarray, with_ohm: bool = True) -> float:
+    """Return how far a prediction is off at worst where a log is what is kept of a wire's that is heated so long, then less, later again."""
+    model = Model(Array(1, 1))
+    model.effects = ["latent_heat", "resistance_phase"]
+    model.parameters = {"latent_heat_j": 8.0, "ambient_c": ROOM_C}
+    power = np.where(
+        (ROW >= FROM_S) & (full_s + FROM_S > ROW) | (ROW >= 600), FULL_W, np.where(ROW < FROM_S, 0.0, after_w)
+    )
+    plant = prediction.plant_of(model)
+    plant.reset()
+    air = np.full(len(ROW), ROOM_C)
+    traced = plant.trace(ROW * 1.0, native.POWER, power[:, None], np.zeros(len(ROW)), air)[:, 0]
+    ohm = MARTENSITE_OHM + traced[:, 1] * (AUSTENITE_OHM - MARTENSITE_OHM)
+    current = np.sqrt(power / ohm)
+    columns = {"i1_a": current} | ({"v1_v": current * ohm} if with_ohm else {})
+    columns |= {"t1_c": traced[:, 0] + np.random.default_rng(1).normal(0.0, 0.05, len(ROW)), "ambient_c": air}
+    path.write_text(log_text(1.0 * ROW[keep], {name: one[keep] for name, one in columns.items()}))
+    return float(np.abs(prediction.predict(model, read_log(path, 1)) - traced[keep, :1]).max())
+
+
+@pytest.mark.parametrize(
+    ("full_s", "after_w", "keep"),
+    [
+        pytest.param(60, 0.0, ROW >= 100, id="cools from austenite"),
+        pytest.param(60, 0.2, ROW >= 120, id="is driven too little to stay austenite"),
+        pytest.param(60, 0.0, (ROW < 10) | (ROW >= 100), id="cools after a gap in which it was hot"),
+        pytest.param(31, 0.2, ROW >= 53, id="falls back before it transforms: v and i say so"),
+        pytest.param(60, 0.2, ROW >= 60, id="is being heated"),
+        pytest.param(33, 0.0, (ROW < 54) | (ROW >= 70), id="was cold enough before the gap"),
+    ],
+)
+def test_a_spring_begins_on_the_branch_that_it_comes_from(
+    tmp_path: Path, full_s: int, after_w: float, keep: np.ndarray
+) -> None:
+    assert cut(tmp_path / "cut.csv", full_s, after_w, keep) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("full_s", "from_s"), [(60, 100), (32, 46)], ids=["nothing drives it", "it is heated, and soon no more"]
+)
+def test_a_spring_begins_on_its_branch_without_v_and_i_too(tmp_path: Path, full_s: int, from_s: int) -> None:
+    assert cut(tmp_path / "cut.csv", full_s, 0.0, from_s <= ROW, with_ohm=False) < 1.0
+
+
+def test_what_is_tried_on_the_way_to_a_start_leaves_no_phase() -> None:
+    """A thermometer that shows too much: where it seems to be the spring would be austenite."""
+    plant = native.Plant(1, 1)
+    plant.set_effects(["sensor_gain"])
+    plant.set("sensor_gain", 1.3)
+    plant.reset()
+    plant.start_from_measured(np.array([104.0]))
+    assert plant.measured_c()[0] == pytest.approx(104.0, abs=0.001)
+    assert plant.austenite()[0] == 0.0

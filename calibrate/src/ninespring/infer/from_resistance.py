@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InputError
+from ..io.logs.branch import CROSSED
 from ..io.logs.run import Run
 from ..model import native
 from ..model.models import Array, Model
@@ -30,8 +31,6 @@ NOISE_V = 2.0 * ROUNDING_V
 """What a voltage is told to, at best: rounding that stays the same is then never structure of half the noise."""
 WEAK_EVERY = 10
 """Rows of which one counts while a spring's current is weak."""
-CROSSED = 0.03
-"""Part of its cold resistance by which a spring's v / i must have changed to have passed its transformation."""
 LIKE_DECLARED = math.log(1.3)
 """What is believed of latent heat and of the phases' resistances: within a third of what is declared."""
 ALIKE = 0.1

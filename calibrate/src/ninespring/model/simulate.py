@@ -26,6 +26,8 @@ AROUND = "shared_air", "plate_conduction"
 """Effects that keep heat around the springs."""
 WARM_K = 3.0
 """A spring that begins so much above its room was driven before: air and plate are warm, too, as if it had been so warm for long."""
+HOTTEST_C = 300.0
+"""Above which nothing transforms any more, and no spring is held."""
 
 SHIFT_PER_N = "transformation_shift_k_per_n"
 LOAD_STEP_N = 0.1
@@ -49,9 +51,23 @@ def started(
     if run.warm:
         _in_balance(plant, native.MODES[run.mode], run.drive[begin])
     elif begin == 0 and any(map(plant.has, AROUND)) and np.nanmax(first, initial=room_c) > room_c + WARM_K:
-        _in_balance(plant, native.TEMPERATURE, np.clip(first, -60.0, 300.0))
+        _in_balance(plant, native.TEMPERATURE, np.clip(first, -60.0, HOTTEST_C))
+    _from_austenite(plant, run, begin, room_c)
     plant.start_from_measured(first + (0.0 if start_offset is None else start_offset))
     return plant
+
+
+def _from_austenite(plant: native.Plant, run: Run, begin: int, was_c: float | np.ndarray) -> None:
+    """Lead springs to austenite that come down from there, and are warmer than what is known, `was_c`, makes them.
+
+    What they are where the log begins follows as they are put down to it. All others are led there from where they were: from the cold
+    at first, and after a gap from before it.
+    """
+    if run.hotter is None:
+        return
+    over = run.temperature_c[begin] > was_c + WARM_K
+    for k in np.flatnonzero(run.hotter[run.starts.index(begin)] & over):
+        plant.set_temperature(int(k), HOTTEST_C)
 
 
 def _in_balance(plant: native.Plant, mode: int, drive: np.ndarray) -> None:
@@ -101,6 +117,7 @@ def simulate_run(
         if piece:
             along.rows(begin - 1, begin + 1)
             along.lay_load(begin)
+            _from_austenite(plant, run, begin, plant.measured_c())
             plant.start_from_measured(run.temperature_c[begin])
         if end - begin == 1 and not trace:
             out[begin:end] = plant.measured_c()

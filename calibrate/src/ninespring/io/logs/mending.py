@@ -11,6 +11,7 @@ import numpy as np
 
 from ...errors import InputError
 from ..statistics import noise_floor, rounding
+from .branch import BEGINS_S, FEWEST, STEADY_K, hotter_before, moved_k
 from .run import Run
 from .table import Table
 
@@ -277,16 +278,14 @@ def mend_first_reading(run: Run) -> None:
 
 def begins_warm(run: Run) -> bool:
     """Driven from the first row on, the same for half a minute, and no spring moves by more than half a degree."""
-    first = run.time_s - run.time_s[0] <= 30.0
-    if first.sum() < 5 or not np.any(run.drive[0] > 0) or np.ptp(run.drive[first], axis=0).max() > 0:
+    first = run.time_s - run.time_s[0] <= BEGINS_S
+    if first.sum() < FEWEST or not np.any(run.drive[0] > 0) or np.ptp(run.drive[first], axis=0).max() > 0:
         return False
     seen = run.temperature_c[first]
     seen = seen[:, np.isfinite(seen).all(axis=0)]
     if not seen.shape[1]:
         return False
-    third = max(1, len(seen) // 3)
-    moved = np.abs(seen[-third:].mean(axis=0) - seen[:third].mean(axis=0))
-    return bool(moved.max() < 0.5)
+    return bool(np.abs(moved_k(seen)).max() < STEADY_K)
 
 
 def longest_step(time_s: np.ndarray) -> float:
@@ -299,9 +298,9 @@ def find_gaps(run: Run) -> None:
     step = np.diff(run.time_s)
     usual, limit = float(np.median(step)), longest_step(run.time_s)
     gaps = np.flatnonzero(step > limit)
-    for row in gaps:
-        begin = int(row) + 1
-        run.starts.append(begin)
+    run.starts += [int(row) + 1 for row in gaps]
+    run.hotter = hotter_before(run)  # while the first readings after a gap are there
+    for begin in run.starts[1:]:
         forgotten = np.searchsorted(run.time_s, run.time_s[begin] + RUN_IN_S)
         run.temperature_c[begin + 1 : forgotten] = np.nan
     if gaps.size:

@@ -8,6 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from .branch import hotter_before
+
 DriveMode = Literal["power", "current", "command"]
 
 
@@ -39,6 +41,8 @@ class Run:
     """The run begins warm and steady: hidden heat is in balance with the first inputs."""
     starts: list[int] = field(default_factory=lambda: [0])
     """Rows at which a simulation starts again from the measured temperatures (the first; after gaps)."""
+    hotter: np.ndarray | None = None
+    """(starts, k): which springs come down from austenite at each of them (`branch`); None: nobody looked."""
 
     rounding_c: np.ndarray | None = None
     """(k,): what the thermometers' steps leave in a reading as it was logged, rms, where they hide its noise."""
@@ -63,15 +67,21 @@ class Run:
     def part(self, rows: slice | np.ndarray) -> Run:
         """Return some rows on end, a slice or a mask, as a run of its own; v and i are left out."""
         ambient, load = self.ambient_c, self.load_n
-        return replace(
+        out = replace(
             self,
             time_s=self.time_s[rows],
             drive=np.ascontiguousarray(self.drive[rows]),
             temperature_c=self.temperature_c[rows].copy(),
             fan=self.fan[rows],
             ambient_c=None if ambient is None else ambient[rows],
-            current_a=None,
-            voltage_v=None,
+            current_a=None if self.current_a is None else self.current_a[rows],
+            voltage_v=None if self.voltage_v is None else self.voltage_v[rows],
             load_n=None if load is None else load[rows],
             starts=[0],
         )
+        first = int(np.arange(len(self.time_s))[rows][0])
+        if self.hotter is not None:
+            known = first in self.starts  # by all of the log, and by what does not count after a gap
+            out.hotter = self.hotter[[self.starts.index(first)]] if known else hotter_before(out)
+        out.current_a = out.voltage_v = None
+        return out
