@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ninespring.find.diagnosis import fit_effects
 from ninespring.infer import predict as prediction
 from ninespring.io.logs import log_text, read_log
 from ninespring.io.logs.run import Run
@@ -124,3 +125,18 @@ def test_what_is_tried_on_the_way_to_a_start_leaves_no_phase() -> None:
     plant.start_from_measured(np.array([104.0]))
     assert plant.measured_c()[0] == pytest.approx(104.0, abs=0.001)
     assert plant.austenite()[0] == 0.0
+
+
+def test_a_log_alone_that_begins_at_rest_begins_at_its_room_whatever_its_model_lacks() -> None:
+    """Free, its room stands in for the latent heat that is not declared: 34 degC."""
+    time_s = np.arange(200.0)
+    drive = np.where((time_s >= 20.0) & (time_s < 50.0) | (time_s > 60.0), FULL_W, 0.0)[:, None]
+    plant = native.Plant(1, 1)
+    plant.set_effects(["latent_heat"])
+    plant.set("latent_heat_j", 8.0)
+    plant.set_ambient(ROOM_C)
+    plant.reset()
+    shown = plant.simulate(time_s, native.POWER, drive, np.zeros(200), np.full(200, ROOM_C))
+    shown += np.random.default_rng(1).normal(0.0, 0.1, shown.shape)
+    run = Run("run", "", time_s, "power", drive, shown, np.zeros(200), None)
+    assert fit_effects(Array(1, 1), [run], [])[1].value("ambient_c@1") == pytest.approx(ROOM_C, abs=1.0)

@@ -51,9 +51,11 @@ def base_spec(problem: Problem, frozen: bool = False, extra: Mapping[str, float]
                     free.append(Free(key, get("command_power_w"), 1e-4, 100.0, "W", (key,), True))
     for r, (run, (low, high)) in enumerate(zip(runs, room.believed(runs), strict=True)):
         if run.ambient_c is None:
-            guess = 0.5 * (low + high) if math.isfinite(high) else _first_guess(run)
+            alone = room.rests_alone(runs)
+            guess = 0.5 * (low + high) if math.isfinite(high) else _first_guess(run) if alone is None else alone
             start, low, high = (float(np.clip(one, -35.0, 75.0)) for one in (guess, low, high))
-            free.append(Free(f"ambient_c@{r + 1}", start, low, high, "degC", run=r))
+            prior = None if alone is None else room.ROOMS_K
+            free.append(Free(f"ambient_c@{r + 1}", start, low, high, "degC", run=r, prior=prior))
     return Spec((), tuple(fixed.items()), tuple(free), ())
 
 

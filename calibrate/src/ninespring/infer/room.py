@@ -102,6 +102,18 @@ def rested(runs: Sequence[Run]) -> list[bool]:
     return found if sum(found) > 1 or one_of_others else [False] * len(runs)
 
 
+def rests_alone(runs: Sequence[Run]) -> float | None:
+    """Return where the springs of a run alone rest at first, degC; None where they do not, or there are other runs.
+
+    They may have been warmed all alike, which others would show: it is as likely as that a room is so far from another day's, to ROOMS_K,
+    and no bound.
+    """
+    if len(runs) != 1 or runs[0].warm:
+        return None
+    first, apart = _begins_at(runs[0])
+    return first if apart <= TOGETHER_K and first <= HOTTEST_C else None
+
+
 def above_logged(run: Run) -> float | None:
     """Return by how much a run that begins at rest does so above the room that was logged, K; None where it does not, or none was.
 
