@@ -71,12 +71,13 @@ static void serial_write(void *, const char *bytes, uint8_t length)
 }
 static const text_output_t serial_output = {nullptr, serial_room, serial_write};
 
-// What is typed comes first: where ticks take long, telemetry would fill the port for ever.
+// What is typed comes before Teleplot's points, which would fill the port for ever where ticks take
+// long; a CSV row is longer than what an answer needs.
 static uint16_t telemetry_room(void *)
 {
     const uint16_t room = board_serial_room();
-    const bool typed = board_serial_waits() && !console_busy(&console);
-    const uint16_t needed = typed ? 2u * CONSOLE_ROOM_BYTES : 0u; // as console_ready has it
+    const bool typed = telemetry.format == TELEMETRY_TELEPLOT && board_serial_waits();
+    const uint16_t needed = typed && !console_busy(&console) ? 2u * CONSOLE_ROOM_BYTES : 0u;
     return room > needed ? (uint16_t)(room - needed) : 0u;
 }
 
