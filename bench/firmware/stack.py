@@ -20,7 +20,7 @@ SAVED_BY_HELPER = 18  # registers that __prologue_saves__ can push
 # Who calls through a pointer, and what can be behind it. The functions behind text_output_t and
 # record_storage_t are in firmware/main.cpp, a record's bytes in settings_record.c, a word's in console_words.c, what scrub looks through in
 # controller_fixed.c and console_settings.c; nothing attaches to Wire as a slave.
-OUTPUT = (r"serial_room", r"serial_write")
+OUTPUT = (r"serial_room", r"telemetry_room", r"serial_write")
 STORAGE = (r"eeprom_read", r"eeprom_ready", r"eeprom_write", r"record_byte")
 STRETCHES = (r"^controller_fixed$", r"^stretch_of")
 WORDS = (r"^word_\w+",)
@@ -35,7 +35,7 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
         r"^(console_|out_end|echo|answer|room_for|list_settings|selftest|start_telemetry|end_job|save|print_|apply_settings)",
         OUTPUT,
     ),
-    (r"^(telemetry_|flush|write_csv|write_spring)", OUTPUT),
+    (r"^(telemetry_|flush|write_csv|write_spring|write_sight|write_mark)", OUTPUT),
     (r"^(settings_|record_store_|examine|slot_|next_byte|take)", STORAGE),
     (r"^(scrub_|checksum)", STRETCHES),
     (r"^__vector_39", NOTHING),
