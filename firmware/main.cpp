@@ -77,7 +77,7 @@ static uint16_t telemetry_room(void *)
 {
     const uint16_t room = board_serial_room();
     const bool typed = telemetry.format == TELEMETRY_TELEPLOT && board_serial_waits();
-    const uint16_t needed = typed && !console_busy(&console) ? 2u * CONSOLE_ROOM_BYTES : 0u;
+    const uint16_t needed = typed && !console_busy(&console) ? CONSOLE_ANSWER_BYTES : 0u;
     return room > needed ? (uint16_t)(room - needed) : 0u;
 }
 

@@ -211,8 +211,7 @@ bool console_busy(const console_t *console)
 
 bool console_ready(const console_t *console)
 {
-    /* a refused setting says two lines */
-    return console->job == CONSOLE_JOB_NONE && room_for(console, 2u * CONSOLE_ROOM_BYTES);
+    return console->job == CONSOLE_JOB_NONE && room_for(console, CONSOLE_ANSWER_BYTES);
 }
 
 void console_break_line(console_t *console, console_error_t error)
@@ -241,7 +240,7 @@ void console_stop(console_t *console)
 /* What is typed is worth less than the answer that needs the room. */
 static void echo(const console_t *console, const char *bytes, uint8_t length)
 {
-    if (console->echo && room_for(console, 2u * CONSOLE_ROOM_BYTES + length)) {
+    if (console->echo && room_for(console, CONSOLE_ANSWER_BYTES + length)) {
         console->output.write(console->output.context, bytes, length);
     }
 }

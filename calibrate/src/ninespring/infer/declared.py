@@ -49,12 +49,13 @@ def base_spec(problem: Problem, frozen: bool = False, extra: Mapping[str, float]
                 if any(np.any(run.drive[:, k] > 0) for run in runs):
                     key = f"command_power_w[{k + 1}]"
                     free.append(Free(key, get("command_power_w"), 1e-4, 100.0, "W", (key,), True))
+    alone = room.rests_alone(runs)
+    prior = None if alone is None else room.ROOMS_K
     for r, (run, (low, high)) in enumerate(zip(runs, room.believed(runs), strict=True)):
         if run.ambient_c is None:
-            alone = room.rests_alone(runs)
-            guess = 0.5 * (low + high) if math.isfinite(high) else _first_guess(run) if alone is None else alone
+            begun = _first_guess(run) if alone is None else alone
+            guess = 0.5 * (low + high) if math.isfinite(high) else begun
             start, low, high = (float(np.clip(one, -35.0, 75.0)) for one in (guess, low, high))
-            prior = None if alone is None else room.ROOMS_K
             free.append(Free(f"ambient_c@{r + 1}", start, low, high, "degC", run=r, prior=prior))
     return Spec((), tuple(fixed.items()), tuple(free), ())
 

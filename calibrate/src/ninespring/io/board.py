@@ -47,6 +47,10 @@ LOOK_EVERY_S = 1.0
 SCRIPT_ALIVE_EVERY_S = 0.2
 """For a script that may sleep or compute between two lines: a simulated board's second may be so short."""
 DRIVES = re.compile(r"\s*(on|pattern)\b", re.IGNORECASE)
+LINE = re.compile("[ -~]+")
+"""What the console takes for a line ..."""
+AT_ONCE = re.compile("[!?]")
+"""... and what is no part of one: it acts as it comes."""
 SAVES = re.compile(r"\s*\$save\s*", re.IGNORECASE)
 STATUS = re.compile(r"^<(off|on|fault|locked)\|t:.*>$")
 """What `?` is answered with."""
@@ -198,9 +202,9 @@ class Board:
         if self._lent and SAVES.fullmatch(line):
             with self._given_back():
                 return self.ask(line, timeout_s)
-        if not re.fullmatch("[ -~]+", line):
+        if not LINE.fullmatch(line):
             raise InputError(f"{line[:40]!r} is not one line of plain ASCII")
-        if re.search("[!?]", line):
+        if AT_ONCE.search(line):
             raise InputError(f"{line[:40]!r}: ! and ? are no part of a line, they act at once: stop_now, status")
         if DRIVES.match(line):
             self._guard_script()

@@ -21,7 +21,7 @@ import numpy as np
 from .. import __version__
 from ..errors import InputError, RefusedError, WorkError
 from . import results
-from .board import Board
+from .board import AT_ONCE, LINE, Board
 from .logs import LIMITS, check_folder
 from .thermometers import Thermometers
 from .words import FAULTS
@@ -95,9 +95,9 @@ def script_lines(text: str, name: str, duration_s: float = math.inf) -> list[Ste
         at_s, before_s = float(match[1]) if match else None, steps[-1].at_s if steps else None
         sent = match[2] if match else line
         wrong = ""
-        if not re.fullmatch("[ -~]+", sent):
+        if not LINE.fullmatch(sent):
             wrong = f"{sent[:40]!r} is not one line of plain ASCII, as the console takes it"
-        elif re.search("[!?]", sent):
+        elif AT_ONCE.search(sent):
             wrong = f"'{sent[:40]}': ! and ? act at once, as they are typed: they are no step"
         elif at_s is None and re.match(r"at\b", line):
             wrong = f"'{line[:40]}' is not `at SECONDS = console line`"
