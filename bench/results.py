@@ -149,7 +149,11 @@ def measure(section: Section) -> None:
         for path, kept in written:  # only once all of it is there
             kept.write_text(path.read_text(encoding="utf-8").rstrip() + "\n", encoding="utf-8")
     code = subprocess.run(
-        ("git", "describe", "--always", "--dirty", "--exclude", "*"), cwd=ROOT, check=True, capture_output=True, text=True
+        ("git", "describe", "--always", "--dirty", "--exclude", "*"),
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+        text=True,
     ).stdout.strip()
     when = json.loads(WHEN.read_text(encoding="utf-8"))
     when[section.name] = f"{datetime.date.today().isoformat()}, {code}"
