@@ -288,7 +288,8 @@ void spring_keep_above(spring_estimator_t *e, spring_belief_t *b, thermal_model_
         const float less_w_per_k = b->covariance / spring_distance_k2(b) * error_k;
         spring_correct_loss(e, b, less_w_per_k);
         b->kept_w_per_k += less_w_per_k;
-        if (!b->trial && !b->hot && spring_keeps_alone(e, b, k)) {
+        if (b->possible == SPRING_PHASE_AUSTENITE && !b->trial && !b->hot &&
+            spring_keeps_alone(e, b, k)) {
             /* it hardly can lose so little: what is read may not be its phase. If it is, the loss
              * is right, and the declared one would overheat it: it stays. */
             b->blind = true;
@@ -387,6 +388,15 @@ static void end_what_was_left(const spring_estimator_t *e, spring_belief_t *b)
     b->left = false;
 }
 
+/* On its way down to a level, or held there: by what it reads some austenite is left for certain.
+ * Then it has not come to martensite finish, whatever its temperature is believed to be. */
+static bool still_reads_austenite(const spring_estimator_t *e, const spring_belief_t *b,
+                                  const thermal_model_t *model, uint8_t k)
+{
+    return (b->possible & SPRING_PHASE_BETWEEN) != 0 && spring_estimator_sees(b) &&
+           b->current_a > STRONG_A && spring_estimator_austenite(e, model, k).low > 0.0f;
+}
+
 static void take_turn(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
@@ -427,7 +437,9 @@ static void take_turn(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     if (now_c7 < t.martensite_finish_c7) {
         const float below_k = spring_c((int16_t)(t.martensite_finish_c7 - now_c7));
-        if (below_k > SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b)) {
+        if (still_reads_austenite(e, b, model, k)) {
+            spring_keep_above(e, b, model, k, spring_c(t.martensite_finish_c7));
+        } else if (below_k > SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b)) {
             b->possible = SPRING_PHASE_MARTENSITE;
             b->lost = 0.0f;
             return;

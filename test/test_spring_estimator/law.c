@@ -193,6 +193,7 @@ TEST(what_keeps_its_phase_is_no_colder_and_tells_of_its_loss)
         begin_cold();
         row(n);
         put(table[n].c);
+        INSIDE.possible = A;
         INSIDE.variance_k2 = 5.0f;
         INSIDE.capacity_k = 2.0f;
         INSIDE.covariance = (float)table[n].cov_w;
@@ -377,6 +378,49 @@ TEST(phase_is_what_temperature_leaves)
         turn();
         TEST_ASSERT_EQUAL_UINT8(table[n].then, INSIDE.possible);
         TEST_ASSERT_EQUAL_FLOAT(table[n].then == M ? 0.0f : 0.5f, INSIDE.lost);
+    }
+}
+
+/* On its way down to a level losses may have fallen, or a load may hold it: what its own
+ * resistances say is left is not cold, and it gives off less; that is no reason to doubt them. At
+ * less than 0.8 A, blind, or with less left than the 21 points by which they may be off, the model
+ * counts. A level that was never fully on goes by its martensite's, 31 points. */
+TEST(what_still_reads_austenite_has_not_cooled)
+{
+    static const struct {
+        uint8_t possible;
+        double austenite, current_a, own_ohm;
+        bool blind, kept;
+    } table[] = {
+        {A | B, 1.0, 1.0, 0.22, false, true},   {A | B, 0.24, 1.0, 0.22, false, true},
+        {A | B, 0.18, 1.0, 0.22, false, false}, {A | B, 1.0, 0.7, 0.22, false, false},
+        {A | B, 1.0, 1.0, 0.22, true, false},   {B, 0.34, 1.0, 0.0, false, true},
+        {B, 0.28, 1.0, 0.0, false, false},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_cold();
+        row(n);
+        put(60.0);
+        INSIDE.last_c7 = thermal_model_temperature_c7(&model, 0);
+        INSIDE.possible = table[n].possible;
+        INSIDE.blind = table[n].blind;
+        INSIDE.variance_k2 = 1.0f;
+        INSIDE.covariance = -1e-3f;
+        INSIDE.loss_variance = 1e-9f;
+        INSIDE.kept_w_per_k = -1e-3f;
+        INSIDE.learnt.austenite_ohm = (float)table[n].own_ohm;
+        INSIDE.learnt.change = 0.2f;
+        INSIDE.learnt.martensite_ohm = 0.176f;
+        give(table[n].current_a, table[n].own_ohm > 0.0
+                                     ? 0.22 * (1.0 - 0.2 * (1.0 - table[n].austenite))
+                                     : 0.176 / (1.0 - 0.2 * table[n].austenite));
+        turn();
+        TEST_ASSERT_EQUAL_UINT8(table[n].kept ? table[n].possible : M, INSIDE.possible);
+        if (table[n].kept) {
+            NEAR(68.0, put_c());
+            TEST_ASSERT_TRUE(INSIDE.learnt.loss_w_per_k < 0.0f);
+            TEST_ASSERT_FALSE(INSIDE.blind);
+        }
     }
 }
 

@@ -652,3 +652,22 @@ TEST(levels_that_are_raised_to_full_leave_no_part_too_hot_and_all_of_them_on)
         TEST_ASSERT_TRUE(k == 4 || world_austenite(world, k) > 0.95);
     }
 }
+
+/* All springs lose three tenths less from 300 s on and are warmer than they are believed when a
+ * level is asked for (144 degC: on their way down they were taken to have cooled while they still
+ * read austenite, and were heated as from cold). */
+TEST(a_level_that_is_asked_for_under_a_cloth_overheats_nothing)
+{
+    static world_parameters_t parameters;
+    world_parameters_default(&parameters);
+    for (int k = 0; k < 9; k++) {
+        parameters.event[parameters.events++] = (world_event_t){WORLD_LOSS_FACTOR, 300.0, k, 0.7};
+    }
+    world_destroy(world);
+    world = world_create(&parameters);
+    TEST_ASSERT_NOT_NULL(world);
+    ask_for(1000);
+    (void)hottest_c_until(500.0);
+    ask_for(700);
+    TEST_ASSERT_TRUE(hottest_c_until(800.0) < 110.0);
+}
