@@ -357,3 +357,25 @@ def test_what_is_left_of_a_plan_begins_with_what_was_on() -> None:
         Step("on 3 50", 11.0),
         Step("off all", 41.0),
     ]
+
+
+def test_a_plan_goes_on_from_what_all_killed_programs_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ",".join(["time_s", *(f"i{k}_a" for k in range(1, 10))])
+    begins: list[float] = []
+    lasts = [0, 2, 200, 300, 10]  # rows: killed by turns before the first, at once, and after minutes
+
+    def killed(self: Calibration, log: str, steps: list[Step], duration_s: float, words: str) -> Recording:
+        rows = [f"{k}.0" + ",0.1" * 9 for k in range(lasts[len(begins)])]
+        (tmp_path / f"{log}.part").write_text("\n".join(["# port: x", *([names] if rows else []), *rows, ""]))
+        begins.append(900.0 - duration_s)
+        raise SystemExit
+
+    monkeypatch.setattr(Calibration, "_record", killed)
+    (tmp_path / "run1-steps.txt").write_text("at 5 = on 1\n")
+    for _ in lasts:
+        told = Told(tmp_path)
+        told.progress.keep("plan", {"most_a": 1.0, "hottest_c": 50.0})
+        with pytest.raises(SystemExit):
+            told.chain._measure("run1")
+        told.board.close()
+    assert begins == [0.0, 0.0, 0.0, 199.0, 498.0]

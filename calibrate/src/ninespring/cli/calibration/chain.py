@@ -48,6 +48,8 @@ DRIVES = 2
 and in the first it lets every spring cool until it loses its phase, to find out where that is."""
 SOON_S = 1.0
 """What was on is on again so long after the first row."""
+FEWEST_ROWS = 3
+"""Of a log, for it to be read."""
 ONE = re.compile(r"(on|off) (\d+|all)(?: (\d+))?")
 
 Ask = Callable[[str], bool]
@@ -172,49 +174,36 @@ class Calibration:
         pieces, duration = list(done["pieces"]), self.progress.option("duration")
         text = read_bytes(self.folder / f"{name}-steps.txt").decode()
         steps = script_lines(text, f"{name}-steps.txt")
-        if killed := self._adopt(name, pieces):
-            pieces.append(killed)
-        from_s = max((one["to_s"] for one in pieces if one["used"]), default=0.0)
-        if from_s:
+        for part in sorted(self.folder.glob(f"{name}*.csv.part")):  # a killed program left it
+            log = self.free(name)
+            part.rename(self.folder / log)
+            self._keep(name, pieces, log, Recording())
+        if from_s := _until(pieces):
             self._tell(name, f"goes on at {from_s:.0f} s of {duration:g}: what was measured until then is kept")
         if duration - from_s > 1.0:
             log = self.free(name)
             got = self._record(log, left_of(steps, from_s, self.array.springs), duration - from_s, f"{name}: measuring")
-            pieces.append(self._piece(log, from_s, got))
-        last = pieces[-1]
-        complete = last["to_s"] >= duration - 2.0 and not last["ended"]
-        used = [one["log"] for one in pieces]
-        self.progress.keep(name, {"pieces": pieces, "complete": complete}, *used)
-        if not complete:
-            if last["ended"]:
-                raise WorkError(f"{last['ended']}; {last['log']} is kept: the same command goes on from there")
+            self._keep(name, pieces, log, got)
+        if not self.progress.done[name]["complete"]:
+            if last := pieces[-1]["ended"]:
+                raise WorkError(f"{last}; {pieces[-1]['log']} is kept: the same command goes on from there")
             raise KeyboardInterrupt
         rows = sum(one["rows"] for one in pieces)
-        self._tell(name, f"{rows} rows in {', '.join(used)}")
+        self._tell(name, f"{rows} rows in {', '.join(one['log'] for one in pieces)}")
 
-    def _adopt(self, name: str, pieces: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
-        """Return the piece that a killed program left as NAME.part, now with a name of its own."""
-        for part in sorted(self.folder.glob(f"{name}*.csv.part")):
-            log = self.free(name)
-            part.rename(self.folder / log)
-            from_s = max((one["to_s"] for one in pieces if one["used"]), default=0.0)
-            return self._piece(log, from_s, Recording(ended=""))
-        return None
-
-    def _piece(self, log: str, from_s: float, got: Recording) -> dict[str, Any]:
-        """Return what is kept of a recording: a part of a plan that is shorter than a log's run-in tells nothing."""
-        run = read_log(self.folder / log, self.array.springs, temperatures=False)
-        began = float(run.time_s[0])
-        fault_s = next((one.time_s for one in got.faults if one.time_s is not None), None)
-        lasted = (float(run.time_s[-1]) if fault_s is None else min(fault_s, float(run.time_s[-1]))) - began
-        return {
-            "log": log,
-            "rows": len(run.time_s),
-            "from_s": from_s,
-            "to_s": from_s + lasted,
-            "ended": got.ended,
-            "used": lasted >= RUN_IN_S or (not from_s and lasted >= self.progress.option("duration") - 2.0),
-        }
+    def _keep(self, name: str, pieces: list[dict[str, Any]], log: str, got: Recording) -> None:
+        """Keep what came of a recording: a part of a plan that is shorter than a log's run-in tells nothing."""
+        rows = sum(line[:1].isdigit() for line in read_bytes(self.folder / log).splitlines())
+        from_s, lasted, duration = _until(pieces), 0.0, self.progress.option("duration")
+        if rows >= FEWEST_ROWS:
+            run = read_log(self.folder / log, self.array.springs, temperatures=False)
+            rows, ends_s = len(run.time_s), [one.time_s for one in got.faults if one.time_s is not None]
+            lasted = min([float(run.time_s[-1]), *ends_s]) - float(run.time_s[0])
+        to_s = from_s + lasted
+        used = lasted >= RUN_IN_S or (not from_s and lasted >= duration - 2.0)
+        pieces.append({"log": log, "rows": rows, "from_s": from_s, "to_s": to_s, "ended": got.ended, "used": used})
+        complete = to_s >= duration - 2.0 and not got.ended
+        self.progress.keep(name, {"pieces": pieces, "complete": complete}, *(one["log"] for one in pieces))
 
     def free(self, stem: str) -> str:
         """Return the next name of a log in the folder."""
@@ -447,6 +436,11 @@ class Calibration:
             )
         else:
             self._tell("", "the board has its own settings again; none was saved")
+
+
+def _until(pieces: Sequence[Mapping[str, Any]]) -> float:
+    """Return how much of a plan these pieces have measured, s."""
+    return max((one["to_s"] for one in pieces if one["used"]), default=0.0)
 
 
 def _words(how: str, found: dict[str, float], faults: Sequence[Any]) -> str:
