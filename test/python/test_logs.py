@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from made import keep_rows
 from ninespring.errors import InputError
+from ninespring.find.steady import is_steady
 from ninespring.io.logs import condense, log_text, read_log, read_table
 from ninespring.io.logs.run import Run
 from ninespring.model import native
@@ -451,3 +453,15 @@ def test_a_negative_current_is_not_taken_for_milliamperes(make_log, value: float
     log = make_log(change=lambda c: c["i3_a"].__setitem__(slice(50, 60), value))
     with pytest.raises(InputError, match=said):
         read_log(log)
+
+
+def test_a_log_that_comes_through_a_pipe_is_the_log(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("time_s,i1_a,t1_c\n" + "".join(f"{k},1,2{k}\n" for k in range(5)))
+    out_of, into = os.pipe()
+    os.write(into, log.read_bytes())
+    os.close(into)
+    piped = f"/dev/fd/{out_of}"
+    assert not is_steady(piped)  # looks at it first
+    assert read_log(piped).sha256 == read_log(log).sha256
+    os.close(out_of)

@@ -62,9 +62,7 @@ class Table:
     def refuse_cell(self, message: str, row: int, name: str) -> InputError:
         """Return a refusal of a cell that has been read."""
         line = int(self.lines[row])
-        with open(self.path, encoding="utf-8-sig", errors="replace", newline="") as stream:
-            text = next((one for number, one in enumerate(stream, start=1) if number == line), "")
-        cells = text.rstrip("\r\n").split(",")[: self.names.index(name)]
+        cells = read_text(self.path).split("\n")[line - 1].split(",")[: self.names.index(name)]
         return self.refuse(message, line, 1 + sum(len(one) + 1 for one in cells))
 
     def read_rows(self, text_columns: Iterable[str] = ()) -> Table:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import os
@@ -21,8 +22,7 @@ KEPT = "what was measured is never written over"
 
 def sha256_of(path: str | Path) -> str:
     """Return the SHA-256 of a file, hexadecimal."""
-    with open(path, "rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+    return hashlib.sha256(read_bytes(path)).hexdigest()
 
 
 _OF_TOOL = re.compile(rb"(?:#[^\n]*\n)*?# tool: ninespring \S+ (predict|replay)\n")
@@ -133,11 +133,14 @@ def write_atomically(files: Mapping[Path, str | bytes], force: bool = False) -> 
             temporary.unlink(missing_ok=True)
 
 
+_once = functools.cache(lambda path: Path(path).read_bytes())
+"""What comes through a pipe, which can be read once, and is looked at several times."""
+
+
 def read_bytes(path: str | Path) -> bytes:
     """Return the file's bytes, or refuse with what the system says."""
     try:
-        with open(path, "rb") as stream:
-            return stream.read()
+        return Path(path).read_bytes() if Path(path).is_file() else _once(str(path))
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", path) from None
 
