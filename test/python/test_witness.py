@@ -194,9 +194,9 @@ def told_by(monkeypatch: pytest.MonkeyPatch, *times: tuple[int, float, float, fl
             columns[0] = columns[0] + rng.normal(0.0, 1e-3, long_s)
             columns[3] = begin_s + np.arange(long_s)
             columns[5] = np.linspace(from_c, to_c, long_s) - 20.0
-            parts.append([columns[n] for n in (0, 1, 2, 3, 4, 5, 6)])
+            parts.append([*columns, columns[5] < 48.0])
             begin_s += long_s + 60.0
-    read = Readings(*(np.concatenate([part[n] for part in parts]) for n in range(7)))
+    read = Readings(*(np.concatenate([part[n] for part in parts]) for n in range(8)))
     read.spring, read.run = read.spring.astype(int), read.run.astype(int)
     monkeypatch.setattr(resistance, "readings", lambda problem, fit: read)
     monkeypatch.setattr(contacts, "dated", lambda problem, steps: steps)
@@ -218,6 +218,13 @@ def test_a_spring_that_did_not_transform_wholly_is_neither_a_contact_nor_a_coeff
 ) -> None:
     partly, wholly = (80, 1.0, 95.0, 85.0, 0.209), (100, 1.0, 120.0, 105.0, 0.2145)
     assert told_by(monkeypatch, COLD, partly, COLD, wholly, COLD, wholly, partly) == ["resistance_phase"]
+
+
+def test_a_spring_that_begins_to_transform_more_slowly_than_the_model_is_no_contact(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    begins = (100, 0.005, 84.0, 88.0, 0.179)
+    assert told_by(monkeypatch, COLD, COLD, begins) == []
 
 
 def test_a_contact_that_cold_wire_shows_is_placed_by_hot_readings_too(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -298,7 +305,8 @@ def test_what_is_far_below_a_finding_is_not_taken_apart(monkeypatch: pytest.Monk
     wander = 2e-4 * np.sin(time_s / 60.0)  # ohm: far above the noise, a tenth of the smallest contact
     ohm = 0.2 + wander + rng.normal(0.0, 1e-5, rows)
     zeros = np.zeros(rows)
-    read = Readings(ohm, zeros.astype(int), zeros.astype(int), time_s, zeros, zeros + 10.0, np.full(rows, 1e-5))
+    spring, noise, cold = zeros.astype(int), np.full(rows, 1e-5), np.ones(rows, dtype=bool)
+    read = Readings(ohm, spring, spring, time_s, zeros, zeros + 10.0, noise, cold)
     asked = []
     solve = contacts.solve
     monkeypatch.setattr(contacts, "solve", lambda *given: asked.append(1) or solve(*given))

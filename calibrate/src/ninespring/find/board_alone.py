@@ -26,7 +26,7 @@ from . import contacts, resistance
 from .certainty import NAMED, Witness, witness
 from .diagnosis import identifiability_of, share_with
 from .evidence import unexplained
-from .readings import REFERENCE_C, Readings, settled
+from .readings import REFERENCE_C, Readings, colder, settled
 from .residual import depends_on
 from .search import Search
 
@@ -44,9 +44,11 @@ def changed_contacts(problem: from_resistance.Resistances, fit: Fit) -> list[con
         noise_mv = np.broadcast_to(problem.noise[r], here.shape)
         current = run.current_a[here]
         ohm, noise = 1e-3 * fit.residual[r][here] / current, 1e-3 * noise_mv[here] / current
-        over_k = traced[:, :, 0][here] - REFERENCE_C
-        parts.append((ohm, springs, np.full(len(ohm), r), run.time_s[rows], traced[:, :, 1][here], over_k, noise))
-    read = Readings(*(np.concatenate([part[n] for part in parts]) for n in range(7)))
+        hot_c, phase = traced[:, :, 0], traced[:, :, 1][here]
+        cold = colder(problem, fit, hot_c)[here]
+        at = springs, np.full(len(ohm), r), run.time_s[rows]
+        parts.append((ohm, *at, phase, hot_c[here] - REFERENCE_C, noise, cold))
+    read = Readings(*(np.concatenate([part[n] for part in parts]) for n in range(8)))
     columns = {f"own {k}": (read.spring == k).astype(float) for k in np.unique(read.spring)}
     # beside what else a fit may have wrong of resistances
     columns["rise martensite"] = read.over_k * (1.0 - read.phase)

@@ -55,9 +55,8 @@ class Step:
 
 def find(read: Readings, columns: dict[str, np.ndarray]) -> tuple[list[Step], Linear]:
     """Return the changes that earn their price beside `columns`, in time's order, and the fit with them."""
-    cold = read.phase < 0.5
-    shown = {key: one[cold] for key, one in columns.items() if one[cold].any()}
-    loose = {one.spring for one in _among(read.of(cold), shown)[0]} if shown else set()
+    shown = {key: one[read.cold] for key, one in columns.items() if one[read.cold].any()}
+    loose = {one.spring for one in _among(read.of(read.cold), shown)[0]} if shown else set()
     return _among(read, columns, loose)
 
 

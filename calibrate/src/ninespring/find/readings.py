@@ -48,6 +48,8 @@ class Readings:
     over_k: np.ndarray
     noise: np.ndarray
     """Of each row, ohm."""
+    cold: np.ndarray
+    """Which are below the martensite's finish: there a spring is martensite whatever it was, and has not begun to be else."""
 
     def of(self, rows: np.ndarray) -> Readings:
         """Return some of the rows."""
@@ -71,6 +73,7 @@ def readings(problem: Problem, fit: Fit) -> Readings | None:
         if run.current_a is None or run.voltage_v is None:
             continue
         traced, known = _as_measured(problem, fit, r)
+        cold = colder(problem, fit, traced[:, :, 0])
         told = known & settled(run, traced[:, :, 1])
         ohm = ohm_of(run)
         noise = statistics.noise_floor(ohm, run.starts)
@@ -80,10 +83,17 @@ def readings(problem: Problem, fit: Fit) -> Readings | None:
                 n = len(here)
                 columns = (ohm[here, k], np.full(n, k), np.full(n, r), run.time_s[here])
                 sigma = np.hypot(noise[k], ROUNDING_V / run.current_a[here, k])
-                parts.append((*columns, traced[here, k, 1], traced[here, k, 0] - REFERENCE_C, sigma))
+                parts.append((*columns, traced[here, k, 1], traced[here, k, 0] - REFERENCE_C, sigma, cold[here, k]))
     if not parts:
         return None
-    return Readings(*(np.concatenate([part[j] for part in parts]) for j in range(7)))
+    return Readings(*(np.concatenate([part[j] for part in parts]) for j in range(8)))
+
+
+def colder(problem: Problem, fit: Fit, temperature_c: np.ndarray) -> np.ndarray:
+    """Return where springs of these temperatures (rows, springs) are below their martensite's finish."""
+    plant = problem.plant_for(fit.spec, fit.values)
+    shift_k = [plant.get(f"transformation_shift_k[{k + 1}]") for k in range(temperature_c.shape[1])]
+    return temperature_c < plant.get("martensite_finish_c") + np.array(shift_k)
 
 
 def settled(run: Run, austenite: np.ndarray) -> np.ndarray:
