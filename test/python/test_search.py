@@ -403,6 +403,13 @@ def test_a_search_that_has_had_its_simulations_begins_no_further_step(make_log) 
     assert found.forward(base).spec.effects == ("edge_loss",)
 
 
+def test_a_screen_that_is_kept_holds_no_readings(make_log) -> None:
+    """Of half a day of nine springs those of one are 40 MB, and a diagnosis keeps ten."""
+    found = searched(read_log(make_log(seed=3)))
+    kept = vars(found.screen(found.base)).values()
+    assert sum(one.size for one in kept if isinstance(one, np.ndarray)) < 4 * found.problem.count
+
+
 def test_all_searches_draw_from_one_budget(make_log) -> None:
     found = searched(read_log(make_log(effects={"edge_loss": {"edge_loss_fraction": 0.2}}, seed=3)))
     problem, base = found.problem, found.base

@@ -280,15 +280,21 @@ def _windows(
     edges = np.arange(0, rows, grid)
     if len(edges) < 4:
         return []
-    answer = step_answers(problem, fit, r, edges, typical_w)
     ends = (*(int(edge) for edge in edges), rows)
     begin = sum(samples[:r])
 
+    def thinned(block: np.ndarray) -> np.ndarray:
+        """Return fields (edges, rows, springs), K, as columns (samples, edges)."""
+        return thin(np.moveaxis(np.where(mask, block / noise, 0.0), 0, 2))
+
+    # what follows from them is linear: of half a day one is twenty megabytes, thinned three
+    answer = step_answers(problem, fit, r, edges, typical_w)
+    steps = [thinned(answer.pop(("heat", k))) for k in range(springs)]
+
     def cause(kind: str, text: str, profile: np.ndarray, block: np.ndarray) -> Cause:
-        """Return the cause of a block of fields (edges, rows, springs)."""
-        columns = np.zeros((sum(samples), len(block)), dtype=np.float32)
-        scaled = np.where(mask, block / noise, 0.0)
-        columns[begin : begin + samples[r]] = thin(np.moveaxis(scaled, 0, 2))
+        """Return the cause of such columns."""
+        columns = np.zeros((sum(samples), len(edges)), dtype=np.float32)
+        columns[begin : begin + samples[r]] = block
         profiles = [None] * len(problem.runs)
         profiles[r] = profile
         return Cause(kind, f"{text}, {{}} of run {r + 1}", tuple(profiles), columns, ends)
@@ -296,12 +302,11 @@ def _windows(
     def shaped(k: int, heat: np.ndarray) -> np.ndarray:
         """Return the answers to a heat of spring k that begins at each edge, from those to constant heat between edges."""
         mean = np.add.reduceat(heat, edges) / np.diff(ends)
-        steps = answer["heat", k]
-        between = steps - np.concatenate([steps[1:], np.zeros_like(steps[:1])])
-        return np.cumsum((mean[:, None, None] * between)[::-1], axis=0)[::-1]
+        between = steps[k] - np.pad(steps[k][:, 1:], ((0, 0), (0, 1)))
+        return np.cumsum((mean * between)[:, ::-1], axis=1)[:, ::-1]
 
     out = []
-    everything_lost, everything_driven, warmer = (np.zeros_like(answer["heat", 0]) for _ in range(3))
+    everything_lost, everything_driven, warmer = (np.zeros(steps[0].shape) for _ in range(3))
     one = np.ones(rows)
     for k in range(springs):
         everything_lost += shaped(k, -lost[:, k])
@@ -310,15 +315,15 @@ def _windows(
         everything_driven += driven
         jumps = steps_up(edges, rows, springs, k)
         out.append(cause("contact", f"the drive of spring {k + 1} changes", _only(k, power[:, k], springs), driven))
-        out.append(cause("heat", f"spring {k + 1} is given heat", _only(k, one, springs), answer["heat", k]))
-        out.append(cause("sensor", f"thermometer {k + 1} jumps", _only(k, one, springs), jumps))
+        out.append(cause("heat", f"spring {k + 1} is given heat", _only(k, one, springs), steps[k]))
+        out.append(cause("sensor", f"thermometer {k + 1} jumps", _only(k, one, springs), thinned(jumps)))
         text = f"thermometer {k + 1} shows more of its spring's rise"
         # of the fit's own rise: a part of the readings would explain all that they show
-        out.append(cause("share", text, _only(k, rise[:, k], springs), jumps * rise))
+        out.append(cause("share", text, _only(k, rise[:, k], springs), thinned(jumps * rise)))
     out.append(cause("gust", "all losses change", -lost, everything_lost))
     out.append(cause("surroundings", "the surroundings are warmer", np.outer(loss_w_per_k, np.ones(springs)), warmer))
     if springs > 1:
         every = steps_up(edges, rows, springs, slice(None))
-        out.append(cause("sensor", "all thermometers jump", np.ones((rows, springs)), every))
+        out.append(cause("sensor", "all thermometers jump", np.ones((rows, springs)), thinned(every)))
         out.append(cause("supply", "all drives change", power, everything_driven))
     return out

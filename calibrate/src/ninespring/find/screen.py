@@ -17,8 +17,6 @@ class Screen:
 
     fit: Fit
     candidates: list[Candidate]
-    directions: np.ndarray
-    """(count, total directions), base numbers projected out."""
     owner: np.ndarray
     """Candidate of each direction."""
     gram: np.ndarray

@@ -54,6 +54,8 @@ class Search:
     progress: Callable[[str], None] = lambda text: None
     fits: dict[tuple[tuple[str, str], ...], Fit] = field(default_factory=dict)
     screens: dict[tuple[tuple[str, str], ...], Screen] = field(default_factory=dict)
+    directions: np.ndarray = field(init=False)
+    """Of the last screen alone, (count, total directions), base numbers projected out: in a long log one is 40 MB."""
     until: int = field(init=False)
     """Simulations of the problem after which no further step is begun."""
 
@@ -110,8 +112,9 @@ class Search:
                 probe[k] = [int(j) for j in np.argsort(-promise)[:PLACES]]
                 keep[columns] = False
                 keep[columns[probe[k][0]]] = True
-        directions, moment = directions[:, keep], moment[keep]
-        screen = Screen(fit, open_, directions, owners[keep], directions.T @ directions, moment, probe)
+        self.directions, moment = directions[:, keep], moment[keep]
+        gram = self.directions.T @ self.directions
+        screen = Screen(fit, open_, owners[keep], gram, moment, probe)
         self.screens[key] = screen
         return screen
 

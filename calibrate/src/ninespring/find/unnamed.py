@@ -356,9 +356,10 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
 
 def _named(problem: Problem, first: Search, fit: Fit) -> list[Cause]:
     """Return what the library's own candidates would add to the readings around a fit: a name goes before what has none."""
-    screen = Search(problem, first.candidates, first.base).screen(fit)
+    search = Search(problem, first.candidates, first.base)
+    screen = search.screen(fit)
     kept = [k for k, owner in enumerate(screen.owner) if not screen.candidates[owner].flexible]
-    columns = thinned(problem, screen.directions[:, kept])
+    columns = thinned(problem, search.directions[:, kept])
     return [Cause(NAMED, screen.candidates[screen.owner[k]].effect, (), columns[:, [j]]) for j, k in enumerate(kept)]
 
 

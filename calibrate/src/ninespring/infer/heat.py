@@ -66,7 +66,7 @@ def step_answers(
     usual = _with_heat(problem, fit, r, run, power, np.zeros_like(power))
     ambient = problem.ambient_of(r, fit.as_dict())
     mode = native.MODES[usual.mode]
-    out = {("heat", k): np.zeros((len(edges), *power.shape)) for k in range(run.springs)}
+    out = {("heat", k): np.zeros((len(edges), *power.shape), np.float32) for k in range(run.springs)}
 
     def part(plant: native.Plant, one: Run, begin: int, end: int) -> np.ndarray:
         rows = slice(begin, end)
@@ -95,7 +95,7 @@ def step_answers(
         of_piece(begin, end)
     if run.springs > 1:
         # one by one: of half a day each is tens of megabytes
-        common = out["common", -1] = np.zeros((len(edges), *power.shape))
+        common = out["common", -1] = np.zeros((len(edges), *power.shape), np.float32)
         for k in range(run.springs):
             common += out["heat", k]
     return out
