@@ -160,6 +160,17 @@ def test_a_logger_with_dates_quotes_and_an_old_character_set_is_read(tmp_path: P
     assert [[float(cell) for cell in row] for row in rows] == [[0, 20.5, 0.5], [1.5, 21, 0]]
 
 
+def test_a_clock_that_was_set_back_is_refused_where_it_was_unless_it_says_its_zone(tmp_path: Path) -> None:
+    (tmp_path / "map.toml").write_text('[columns]\ntime_s = {column = "Time", unit = "iso"}\nt1_c = "T"\n')
+    clock, log = ["02:59:59", "02:00:01"], tmp_path / "log.csv"
+    log.write_text("Time,T\n" + "".join(f"2026-10-25 {one},20\n" for one in clock))
+    with pytest.raises(InputError, match=r"log\.csv:3:1: the time falls by 3598 s"):
+        importing.import_table(log, tmp_path / "map.toml")
+    zones = zip(clock, ("+02:00", "+01:00"), strict=True)
+    log.write_text("Time,T\n" + "".join(f"2026-10-25 {one}{zone},20\n" for one, zone in zones))
+    assert importing.import_table(log, tmp_path / "map.toml").endswith("\n2.00000,20.00000\n")
+
+
 @pytest.mark.parametrize(
     "form",
     [

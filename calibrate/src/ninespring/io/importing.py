@@ -151,6 +151,12 @@ def import_table(path: str | Path, mapping: str | Path) -> str:
     out = {name: _column(table, name, rule, path) for name, rule in rules["columns"].items()}
     out |= {name: np.full(len(table.frame), value) for name, value in rules["constants"].items()}
     time_s = out.pop("time_s")
+    if (fell := np.flatnonzero(np.diff(time_s) < 0.0)).size:
+        said = (
+            f"the time falls by {-np.diff(time_s)[fell[0]]:g} s: two runs in one file? Make two files. "
+            "A clock that was set back, as in autumn, has times with their zone: 2026-10-25 02:30:00+01:00"
+        )
+        raise InputError(said, path, table.numbers[int(fell[0]) + 2], 1)
     for name in out:
         if re.fullmatch(r"t\d+_c", name):
             _refuse_kelvin(out[name], f'unit = "K" for {name} in the mapping converts', path)
