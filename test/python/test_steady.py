@@ -49,6 +49,19 @@ def test_the_model_afterwards_has_everything_that_was_set() -> None:
     assert np.abs(steady.errors(Array(), {}, on, table)).max() < 0.2
 
 
+def test_of_a_row_all_that_was_measured_is_told() -> None:
+    table = states(MIXING)[:3]
+    table[0].measured_c[:] = math.nan
+    for one in table[1:]:
+        one.measured_c[3:6] = steady.settle(Array(), {}, MIXING, one)[3:6]
+    told = steady.diagnose_states(Array(), {}, table)
+    assert told.effects[0].name == "optical_mixing"
+    named = [f"{one.case}, spring {k}" for one in table[1:] for k in (4, 5, 6)]
+    assert [one.case for one in told.cases] == named
+    shown = np.concatenate([one.measured_c[3:6] for one in table[1:]])
+    assert [one.after_c for one in told.cases] == pytest.approx(list(shown), abs=0.3)
+
+
 def test_a_state_that_is_left_out_is_not_fitted() -> None:
     table = states(MIXING)
     table[0].measured_c[4] += 10.0

@@ -201,7 +201,8 @@ def diagnose_states(
     The declared model stays frozen. Held out: one state after the other.
     """
     before = errors(array, declared, {}, states)
-    watched = int(np.flatnonzero(np.isfinite(states[0].measured_c))[0])
+    seen = [(state, int(k)) for state in states for k in np.flatnonzero(np.isfinite(state.measured_c))]
+    watched = seen[0][1]
     tried = []
     for effect in effects.library():
         progress(f"fitting {effect.name}")
@@ -216,10 +217,13 @@ def diagnose_states(
     best = useful[0] if useful else None
     after = best.told if best else None
     note = f"{len(before)} numbers: no noise can be estimated; 1 degC is assumed (the table gives whole degrees)"
-    measured = [float(state.measured_c[watched]) for state in states]
     cases = [
-        results.Case(case=state.case, measured_c=shown, before_c=shown - float(left))
-        for state, shown, left in zip(states, measured, before, strict=True)
+        results.Case(
+            case=state.case if len(seen) == len(states) else f"{state.case}, spring {k + 1}",
+            measured_c=float(state.measured_c[k]),
+            before_c=float(state.measured_c[k] - left),
+        )
+        for (state, k), left in zip(seen, before, strict=True)
     ]
     for case, left in zip(cases, best.left if best else (), strict=bool(best)):
         case.after_c = case.measured_c - float(left)
