@@ -37,6 +37,14 @@ def test_nothing_is_adopted_where_nothing_is_missing(make_log) -> None:
     assert result["after"]["rmse_c"] == pytest.approx(0.3, rel=0.05)
 
 
+def test_what_a_fit_keeps_of_long_logs_is_bounded_by_readings(make_log) -> None:
+    run = read_log(make_log(seconds=9000))
+    one = diagnosis.prepare(Array(), [run])
+    assert 2000 < sum(len(each.time_s) for each in one.runs) <= 3000  # nine springs
+    three = diagnosis.prepare(Array(), [run] * 3)
+    assert sum(len(each.time_s) for each in three.runs) <= 3000
+
+
 @pytest.mark.parametrize(
     ("effect", "numbers", "columns"),
     [

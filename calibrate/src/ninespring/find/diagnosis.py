@@ -45,6 +45,8 @@ from .certainty import CERTAIN, NAMED, Witness, witness
 from .evidence import EQUIVALENT, difference, excess, likelihood, log_evidence, unexplained
 from .residual import depends_on
 
+MOST_ROWS, MOST_READINGS = 6_000, 27_000
+"""Of all logs that are fitted; of all their springs: a diagnosis keeps the slopes of some fifty fits, 1 GB of them."""
 MOST_OF_IT = 0.5
 """Part of what is beyond the noise without an effect that it explains, where more is explained than left."""
 LEAST_PART = 0.01
@@ -81,7 +83,8 @@ class Diagnosis:
 
 def prepare(array: Array, runs: Sequence[Run], declared: Mapping[str, float] | None = None) -> Problem:
     """Return the problem of these runs, condensed where they are long."""
-    share = max(600, 6000 // max(1, len(runs)))
+    rows = min(MOST_ROWS, MOST_READINGS // array.springs)
+    share = max(600, rows // max(1, len(runs)))
     return Problem(array, [condense(run, share) for run in runs], declared)
 
 
