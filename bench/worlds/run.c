@@ -107,16 +107,22 @@ static bool learn(bench_t *bench)
     return true;
 }
 
-/* Types what is due. */
+/* Types what is due. What is asked for a level is not judged as driven. */
 static void type(bench_t *bench, score_t *score, int *typed)
 {
     const run_case_t *run = bench->run;
     while (*typed < run->commands && run->command[*typed].time_s <= world_time_s(bench->world)) {
         const run_command_t *command = &run->command[(*typed)++];
         for (int k = 0; k < world_springs(bench->world); k++) {
-            score_ask(score, bench->world, k, command->on[k]);
+            score_ask(score, bench->world, k, command->on[k] && command->level_permille[k] == 0);
         }
         controller_set_pattern(&bench->controller, command->on);
+        for (int k = 0; k < world_springs(bench->world); k++) {
+            if (command->on[k] && command->level_permille[k] != 0) {
+                (void)controller_set_target(&bench->controller, (uint8_t)k,
+                                            command->level_permille[k]);
+            }
+        }
     }
 }
 

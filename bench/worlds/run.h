@@ -5,6 +5,7 @@
 #define WORLDS_RUN_H
 
 #include <stdbool.h>
+#include <stdint.h>
 #include <stdio.h>
 
 #include "losses.h"
@@ -17,6 +18,7 @@
 typedef struct {
     double time_s;
     bool on[WORLD_SPRINGS_MAX];
+    uint16_t level_permille[WORLD_SPRINGS_MAX]; /* of one that is on; 0: fully */
 } run_command_t;
 
 typedef struct {

@@ -562,6 +562,52 @@ static void reset(draw_t *draw)
     say(draw, "reset at %.0f s for %.1f s", draw->run->reset_s, draw->run->reset_gap_s);
 }
 
+/* Of a spring whose level changes: fully, not at all, or between. */
+static void ask_for_a_level(draw_t *draw, run_command_t *command, int k)
+{
+    const double kind = uniform(draw, 0.0, 1.0);
+    const double level_permille = uniform(draw, 150.0, 900.0);
+    command->on[k] = kind < 0.8;
+    command->level_permille[k] = kind < 0.45 ? (uint16_t)level_permille : 0;
+}
+
+/* Of all springs one level, or of some each its own. Before the last pattern, and the power that
+ * goes off, nothing is asked for: what the board starts with is not theirs. */
+static void levels(draw_t *draw)
+{
+    run_case_t *run = draw->run;
+    const run_command_t *last = run->commands > 0 ? &run->command[run->commands - 1] : NULL;
+    const double from_s = fmax(last != NULL ? last->time_s : 0.0, run->reset_s + run->reset_gap_s);
+    double s = from_s + uniform(draw, 60.0, 300.0);
+    const int times = (int)uniform(draw, 2.0, 8.0);
+    for (int i = 0; i < times && s < run->seconds; i++) {
+        run_command_t *command = &run->command[run->commands++];
+        memcpy(command->on, last != NULL ? last->on : run->on, sizeof command->on);
+        if (last != NULL) {
+            memcpy(command->level_permille, last->level_permille, sizeof command->level_permille);
+        }
+        command->time_s = s;
+        const int first = (int)uniform(draw, 0.0, count(draw));
+        const bool all = chance(draw, 0.4);
+        ask_for_a_level(draw, command, first);
+        for (int k = 0; k < count(draw); k++) {
+            if (all) {
+                command->on[k] = command->on[first];
+                command->level_permille[k] = command->level_permille[first];
+            } else if (k != first && chance(draw, 0.3)) {
+                ask_for_a_level(draw, command, k);
+            }
+        }
+        say(draw, "%.0f s: %s %d %.0f %%", s, all ? "all, as" : "some,", first + 1,
+            !command->on[first]                   ? 0.0
+            : command->level_permille[first] != 0 ? 0.1 * command->level_permille[first]
+                                                  : 100.0);
+        draw->swarm->levels = draw->swarm->steps = true;
+        last = command;
+        s += uniform(draw, 10.0, 250.0);
+    }
+}
+
 typedef struct {
     double probability;
     void (*draw)(draw_t *draw);
@@ -606,6 +652,7 @@ static const disturbance_t drawn[] = {
     {0.06, habits, "up to three other patterns"},
     {0.04, reset, "power off and on"},
     {0.40, diodes, "diodes that drop 0.30 to 0.45 V, declared within 0.05 V or, half of them, not"},
+    {0.20, levels, "a user of levels: 15 to 90 %, fully, off, of some or all"},
 };
 #define DECLARED ((int)(sizeof declared / sizeof declared[0]))
 #define DRAWN    ((int)(sizeof drawn / sizeof drawn[0]))

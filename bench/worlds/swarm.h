@@ -33,6 +33,7 @@ typedef struct {
     swarm_diode_t diode; /* that freewheels */
     bool steps;          /* anything at all changes in the run but the noise */
     bool second;         /* the second truth: other equations of transformation and convection */
+    bool levels;         /* springs are asked for levels, too */
     bool told;  /* its alloy's temperatures are: the board knows another martensite start */
     bool tells; /* the resistance changes enough with the phase to tell it */
     bool broken[WORLD_SPRINGS_MAX];       /* its sensor is: it is right to give it up */

@@ -50,7 +50,7 @@ struct run_t {
     swarm_group_t group = SWARM_NOTHING;
     swarm_diode_t diode = SWARM_SYNCHRONOUS;
     std::uint64_t drawn = 0;
-    bool steps = false, second = false, tells = false, told = false, done = false;
+    bool steps = false, second = false, levels = false, tells = false, told = false, done = false;
     kinetics_law_t law = KINETICS_COSINE;
     double hottest_c = 0.0, wall_s = 0.0;
     std::string says;
@@ -93,6 +93,7 @@ void drive(const options_t &options, run_t &run, FILE *trace)
     run.drawn = drawn->drawn;
     run.steps = drawn->steps;
     run.second = drawn->second;
+    run.levels = drawn->levels;
     run.tells = drawn->tells;
     run.told = drawn->told;
     run.law = drawn->run.world.spring[0].alloy.law;
@@ -136,6 +137,7 @@ const part_t parts[] = {
     {"neither", [](const run_t &r) { return r.group == SWARM_NOTHING; }},
     {"nothing steps", [](const run_t &r) { return !r.steps; }},
     {"second truth", [](const run_t &r) { return r.second; }},
+    {"levels", [](const run_t &r) { return r.levels; }},
 };
 
 // A row: of each run, how many of how many.
@@ -501,6 +503,7 @@ json_t kept(const options_t &options, const std::vector<run_t> &runs)
         one["group"] = group_names[run.group];
         one["steps"] = run.steps;
         one["second"] = run.second;
+        one["levels"] = run.levels;
         one["tells"] = run.tells;
         one["hottest_c"] = run.hottest_c;
         const auto [inside_s, known_s] = inside(run);

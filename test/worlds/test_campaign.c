@@ -482,6 +482,52 @@ TEST(every_disturbance_is_drawn_as_often_as_is_said)
     TEST_ASSERT_TRUE(d > 25 && d <= 64);
 }
 
+/* Levels, after what else is typed, in order of time; the board has what was asked last. */
+TEST(a_user_of_levels_asks_for_some_after_the_other_patterns_and_the_reset)
+{
+    static swarm_case_t swarm;
+    int users = 0, between = 0;
+    for (int i = 0; i < 500; i++) {
+        swarm_draw(4, i, 900.0, &swarm);
+        const run_case_t *run = &swarm.run;
+        bool any = false;
+        for (int n = 0; n < run->commands; n++) {
+            TEST_ASSERT_TRUE(n == 0 || run->command[n].time_s > run->command[n - 1].time_s);
+            for (int k = 0; k < WORLD_SPRINGS_MAX; k++) {
+                const int permille = run->command[n].level_permille[k];
+                TEST_ASSERT_TRUE(permille == 0 || (permille >= 150 && permille < 900));
+                TEST_ASSERT_TRUE(permille == 0 ||
+                                 (swarm.levels && run->command[n].time_s > run->reset_s));
+                any = any || permille != 0;
+            }
+        }
+        TEST_ASSERT_TRUE(run->commands <= RUN_COMMANDS_MAX);
+        users += swarm.levels;
+        between += any;
+    }
+    TEST_ASSERT_INT_WITHIN(30, 100, users);
+    TEST_ASSERT_TRUE(between > users / 2 && between <= users);
+}
+
+/* Lowered at 30 s and raised at 320 s: it is judged from 530 s on, the other one from 210 s. */
+TEST(what_is_asked_for_a_level_is_not_judged_but_for_what_is_hot)
+{
+    static run_case_t run;
+    static run_result_t result;
+    memset(&run, 0, sizeof run);
+    run.seconds = 600.0;
+    world_parameters_default(&run.world);
+    controller_settings_default(&run.settings);
+    run.on[0] = run.on[8] = true;
+    run.commands = 2;
+    run.command[0] = (run_command_t){30.0, {[0] = true, [8] = true}, {[0] = 300}};
+    run.command[1] = (run_command_t){320.0, {[0] = true, [8] = true}, {0}};
+    TEST_ASSERT_TRUE(run_case(&run, &result, NULL));
+    TEST_ASSERT_DOUBLE_WITHIN(0.3, 70.0, result.losses.spring[0].judged_s);
+    TEST_ASSERT_DOUBLE_WITHIN(0.3, 390.0, result.losses.spring[8].judged_s);
+    TEST_ASSERT_TRUE(result.score.spring[0].hottest_c > 90.0);
+}
+
 static double first_loss_w(world_parameters_t *parameters)
 {
     for (int k = 0; k < parameters->rows * parameters->columns; k++) {
