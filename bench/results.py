@@ -26,8 +26,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 KEPT = ROOT / "docs" / "results"
-WHEN = KEPT / "when.json"
-"""Of each section's name: on which day, of which commit its figures are."""
 PAGE = ROOT / "docs" / "results.md"
 TABLES = ROOT / "docs" / "results-tables.md"
 TARGET = re.compile(r"(?P<sign><=|>=|<|>)\s*(?P<limit>[-+0-9.e]+)|(?P<none>0)")
@@ -148,16 +146,22 @@ def measure(section: Section) -> None:
             done.check_returncode()
         for path, kept in written:  # only once all of it is there
             kept.write_text(path.read_text(encoding="utf-8").rstrip() + "\n", encoding="utf-8")
-    code = subprocess.run(
+    described = subprocess.run(
         ("git", "describe", "--always", "--dirty", "--exclude", "*"),
         cwd=ROOT,
         check=True,
         capture_output=True,
         text=True,
-    ).stdout.strip()
-    when = json.loads(WHEN.read_text(encoding="utf-8"))
-    when[section.name] = f"{datetime.date.today().isoformat()}, {code}"
-    WHEN.write_text(json.dumps(when, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    )
+    measured_on = when()
+    measured_on[section.name] = f"{datetime.date.today().isoformat()}, {described.stdout.strip()}"
+    (KEPT / "when.json").write_text(json.dumps(measured_on, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def when() -> dict[str, str]:
+    """Return on which day, of which commit the figures of each section are."""
+    path = KEPT / "when.json"
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
 
 
 def number(value: object) -> str:
@@ -350,13 +354,13 @@ def first_page() -> str:
         lines.append("")
     lines += ["## Does it hold where the array is not as declared?", "", "[Worlds](worlds.md) says what each is.", ""]
     lines += worlds_in_words()
-    when = json.loads(WHEN.read_text(encoding="utf-8"))
     lines += ["## All targets", "", "| section | met | missed | measured on, of commit |", "|---|---|---|---|"]
     for section in SECTIONS:
         verdicts = [meets(row) for row in figures_of(section)]
         counts = f"{verdicts.count(True)} | {verdicts.count(False)}" if figures_of(section) else " | "
-        measured_on = when.get(section.name, "")
-        lines.append(f"| [{section.title}](results-tables.md#{anchor(section.title)}) | {counts} | {measured_on} |")
+        lines.append(
+            f"| [{section.title}](results-tables.md#{anchor(section.title)}) | {counts} | {when().get(section.name, '')} |"
+        )
     return "\n".join([*lines, "", written()])
 
 

@@ -32,3 +32,4 @@ def test_a_benchmark_that_misses_is_kept_and_one_that_is_broken_is_not(
         with pytest.raises(subprocess.CalledProcessError):
             results.measure(section)
     assert (tmp_path / "one.json").exists() == kept
+    assert list(results.when()) == (["one"] if kept else [])
