@@ -177,8 +177,7 @@ static float sure_rise_per_k(const spring_line_t *line)
 static float by_step_k(const spring_line_t *line, float left, float noise2)
 {
     const float step = sure_rise_per_k(line) * STEPS_K;
-    const float most_k = SPRING_ESTIMATOR_LIKELY_SDS * STEPS_K;
-    return spring_clamp(step / (step * step + noise2) * STEPS_K * left, -most_k, most_k);
+    return step / (step * step + noise2) * STEPS_K * left;
 }
 
 /* It is hotter by so much, and gives off less. */
