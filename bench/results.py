@@ -354,13 +354,13 @@ def first_page() -> str:
         lines.append("")
     lines += ["## Does it hold where the array is not as declared?", "", "[Worlds](worlds.md) says what each is.", ""]
     lines += worlds_in_words()
+    measured_on = when()
     lines += ["## All targets", "", "| section | met | missed | measured on, of commit |", "|---|---|---|---|"]
     for section in SECTIONS:
         verdicts = [meets(row) for row in figures_of(section)]
         counts = f"{verdicts.count(True)} | {verdicts.count(False)}" if figures_of(section) else " | "
-        lines.append(
-            f"| [{section.title}](results-tables.md#{anchor(section.title)}) | {counts} | {when().get(section.name, '')} |"
-        )
+        row = f"[{section.title}](results-tables.md#{anchor(section.title)}) | {counts} | {measured_on.get(section.name, '')}"
+        lines.append(f"| {row} |")
     return "\n".join([*lines, "", written()])
 
 

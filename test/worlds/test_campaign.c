@@ -205,6 +205,15 @@ TEST(a_dither_across_the_limit_is_no_reheat)
     TEST_ASSERT_EQUAL_INT(1, score.spring[4].reheats);
 }
 
+/* Nothing is on, nothing is typed. */
+static void begin_as_declared(run_case_t *run, double seconds)
+{
+    memset(run, 0, sizeof *run);
+    run->seconds = seconds;
+    world_parameters_default(&run->world);
+    controller_settings_default(&run->settings);
+}
+
 /* Each spring of one array has something else: capacity, loss and transformation as far off as is
  * tolerated; coefficients in print, whatever the change; a contact that steps or ages; a noise that
  * stays for a second. None of that is lost phase: all nine are heated for it ten times in a quarter
@@ -226,10 +235,7 @@ TEST(springs_are_within_their_bounds_and_nothing_else_is_taken_for_lost_phase)
                  {1.00, 1.00, 0.0, 1.25, {0.0, 0.0}, 0.0, 0.0, 0.0, 0.001}};
     static run_case_t run;
     static run_result_t result;
-    memset(&run, 0, sizeof run);
-    run.seconds = 900.0;
-    world_parameters_default(&run.world);
-    controller_settings_default(&run.settings);
+    begin_as_declared(&run, 900.0);
     for (int k = 0; k < (int)ROWS(table); k++) {
         world_spring_t *spring = &run.world.spring[k];
         run.on[k] = true;
@@ -514,10 +520,7 @@ TEST(what_is_asked_for_a_level_is_not_judged_but_for_what_is_hot)
 {
     static run_case_t run;
     static run_result_t result;
-    memset(&run, 0, sizeof run);
-    run.seconds = 600.0;
-    world_parameters_default(&run.world);
-    controller_settings_default(&run.settings);
+    begin_as_declared(&run, 600.0);
     run.on[0] = run.on[8] = true;
     run.commands = 2;
     run.command[0] = (run_command_t){30.0, {[0] = true, [8] = true}, {[0] = 300}};
