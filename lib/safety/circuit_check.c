@@ -163,8 +163,8 @@ bool circuit_check_judge(circuit_check_t *c, const circuit_source_t *source, uin
             flows &&
             (other || (variance >= LEAST_VARIANCE && stands(c, should_mv * step_mv, found_mv)));
         const float off_mv = found_mv - declared_mv;
-        unbalanced = fabsf(off_mv) > BALANCE_SHARE * declared_mv + BALANCE_MV +
-                                         (off_mv < 0.0f ? source->more_mv : source->less_mv);
+        const float beyond_mv = fabsf(off_mv) - BALANCE_SHARE * declared_mv - BALANCE_MV;
+        unbalanced = beyond_mv > (off_mv < 0.0f ? source->more_mv : source->less_mv);
         const float square_mv2 = share * (float)c->voltage_square;
         restless = moves_alone(square_mv2 - found_mv * found_mv, follows_mv, variance, found_mv);
         if (window != NULL) {
@@ -174,7 +174,8 @@ bool circuit_check_judge(circuit_check_t *c, const circuit_source_t *source, uin
                                    .current_ma = 2.0f * share * (float)c->current_2ma,
                                    .duty = duty,
                                    .steady = variance < STEADY_SHARE * STEADY_SHARE * duty * duty,
-                                   .tells = true};
+                                   .tells = true,
+                                   .balances = beyond_mv <= 0.0f};
         }
     }
     c->astray = counted(c->astray, astray) & 15u;

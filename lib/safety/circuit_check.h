@@ -52,9 +52,10 @@ typedef struct {
     float found_mv;    /* behind the switch */
     float expected_mv; /* by duty, supply and drop */
     float current_ma;
-    bool tells;  /* there were readings enough */
-    bool steady; /* all at about the same duty */
-    float duty;  /* steps of 800 */
+    bool tells;    /* there were readings enough */
+    bool steady;   /* all at about the same duty */
+    float duty;    /* steps of 800 */
+    bool balances; /* its duty brings what was found, with no help of a drop that is not known */
 } circuit_window_t;
 
 /* Below it, offsets are most of what differs. */

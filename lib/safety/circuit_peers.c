@@ -166,7 +166,9 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     if (odd) {
         own->odd = own->odd < CIRCUIT_PEERS_WINDOWS ? (own->odd + 1u) & 3u : own->odd;
     } else if (good || !was_found(own)) {
-        own->was_q7 = to_q7(share);
+        if (window->balances) { /* what an open spring shows is no share of the supply */
+            own->was_q7 = to_q7(share);
+        }
         own->odd = 0;
         own->agreed = 1;
     }

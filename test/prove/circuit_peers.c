@@ -26,6 +26,7 @@ void main(void)
             .found_mv = Frama_C_float_interval(0.0f, MOST_MV),
             .expected_mv = Frama_C_float_interval(0.0f, MOST_MV),
             .tells = any_bool(),
+            .balances = any_bool(),
         };
         const uint8_t springs = (uint8_t)any_between(1, CIRCUIT_PEERS_MAX);
         const uint8_t spring = (uint8_t)any_between(0, springs - 1);

@@ -106,6 +106,19 @@ def test_what_was_found_twice_is_right_once_it_is_mended(bench: Make) -> None:
     assert made.finds("channels") == []
 
 
+def test_a_spring_that_was_open_is_driven_by_itself_once_it_is_soldered(bench: Make) -> None:
+    """What it showed while it was open is nothing that its circuit showed before."""
+    made = bench("resistor=all", "open=3")
+    made.board.ask("policy open")
+    bringup.rows(made.board, 2.0, "on 3")
+    (fault,) = made.board.ask("faults")[:1]
+    assert fault.startswith("spring 3: fault 2 open_spring"), fault
+    made.wire("resistor=all")
+    made.board.ask("clear")
+    bringup.rows(made.board, 5.0, "on 3")
+    assert not [one for one in made.board.ask("faults") if "fault" in one]
+
+
 def test_a_diode_that_drops_more_than_declared_is_told_from_a_low_supply(bench: Make) -> None:
     made = bench(more=["--set", "plant.freewheel_drop_v=0.39"])
     (found,) = made.finds("channels")

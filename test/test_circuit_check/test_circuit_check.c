@@ -206,7 +206,7 @@ TEST(supply_that_swings_is_found_within_two_seconds)
 TEST(a_window_says_what_its_readings_were)
 {
     for (uint8_t readings = 11; readings <= 29; readings = (uint8_t)(readings + 1u)) {
-        circuit_window_t window = {7.0f, 7.0f, 7.0f, readings < 12, true, 7.0f};
+        circuit_window_t window = {7.0f, 7.0f, 7.0f, readings < 12, true, 7.0f, true};
         setUp();
         for (unsigned tick = 0; tick < 30; tick++) { /* the first one jumps */
             circuit_check_take(&check, 180, 0, 120, tick <= readings, 1000, 200);
@@ -382,6 +382,25 @@ TEST(a_window_tells_whether_it_was_at_one_duty)
         }
         (void)judges(&window);
         TEST_ASSERT_EQUAL(ends[n].steady, window.steady);
+    }
+}
+
+/* By the declared supply of 5 V, whatever a drop may be that is not known: 30 % and offsets. */
+TEST(a_window_tells_whether_its_duty_brings_what_is_found)
+{
+    static const struct {
+        int16_t voltage_mv;
+        bool balances;
+    } finds[] = {{0, false}, {300, false}, {345, true}, {500, true}, {660, true}, {680, false}};
+    source.unsure_mv = source.less_mv = source.more_mv = 300.0f;
+    for (size_t n = 0; n < ROWS(finds); n++) {
+        circuit_window_t window;
+        for (uint16_t tick = 0; tick < 30; tick++) {
+            check.last_duty = 80;
+            circuit_check_take(&check, 180, 0, 80, true, 0, finds[n].voltage_mv);
+        }
+        (void)judges(&window);
+        TEST_ASSERT_EQUAL(finds[n].balances, window.balances);
     }
 }
 

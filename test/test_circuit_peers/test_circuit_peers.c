@@ -21,7 +21,8 @@ void setUp(void)
 
 static bool takes(uint8_t spring, float expected_mv, float share)
 {
-    const circuit_window_t window = {share * expected_mv, expected_mv, 0.0f, true, true, 0.0f};
+    const circuit_window_t window = {
+        share * expected_mv, expected_mv, 0.0f, true, true, 0.0f, true};
     return circuit_peers_judge(&peers, SPRINGS, spring, &window, &source);
 }
 
@@ -98,6 +99,22 @@ TEST(a_sensor_that_was_wrong_from_the_first_may_be_another_one_after_a_clear)
         TEST_ASSERT_EQUAL_HEX(0, rounds(2, driven, HEATS_MV, 0.8f, 1.0f));
         circuit_peers_clear(&peers, 0, false); /* another spring's fault */
         TEST_ASSERT_EQUAL_HEX(1, rounds(3, driven, HEATS_MV, 0.8f, 1.0f));
+    }
+}
+
+/* An open spring shows nothing of what its duty should bring: soldered and cleared, it is driven.
+ */
+TEST(what_is_no_share_of_a_supply_is_not_what_it_showed_before)
+{
+    for (unsigned doubted = 0; doubted < 2; doubted++) {
+        setUp();
+        const circuit_window_t open = {0.0f, HEATS_MV, 0.0f, true, true, 0.0f, false};
+        for (unsigned n = 0; n < 4; n++) {
+            TEST_ASSERT_FALSE(circuit_peers_judge(&peers, SPRINGS, 0, &open, &source));
+        }
+        circuit_peers_clear(&peers, 0, doubted != 0);
+        TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, HEATS_MV, 1.0f, 0.0f));
+        TEST_ASSERT_EQUAL_HEX(1, rounds(3, 1, HEATS_MV, 0.7f, 0.0f)); /* from then on it is */
     }
 }
 
@@ -403,7 +420,7 @@ TEST(the_middle_one_of_the_others_counts)
         }
         (void)takes(4, HEATS_MV, 1.95f);
         const circuit_window_t window = {
-            (odd ? 0.79f : 0.80f) * HEATS_MV, HEATS_MV, 0.0f, true, true, 0.0f};
+            (odd ? 0.79f : 0.80f) * HEATS_MV, HEATS_MV, 0.0f, true, true, 0.0f, true};
         for (unsigned times = 0; times < 3; times++) {
             const bool found = circuit_peers_judge(&peers, 4, asked, &window, &source);
             TEST_ASSERT_EQUAL(odd && times == 2, found);

@@ -36,7 +36,8 @@ static bool takes(shown_t s)
                                      1e3f * s.shown_a,
                                      true,
                                      true,
-                                     0.0f};
+                                     0.0f,
+                                     true};
     return circuit_step_judge(&step, &window, &source, &circuit);
 }
 
@@ -270,7 +271,7 @@ TEST(what_it_showed_before_outlasts_a_short_return)
 /* A window in which the current falls from one to the other is of neither. */
 TEST(a_window_of_two_currents_is_left_out)
 {
-    const circuit_window_t between = {680.0f, 680.0f, 1700.0f, true, false, 0.0f};
+    const circuit_window_t between = {680.0f, 680.0f, 1700.0f, true, false, 0.0f, true};
     for (unsigned k = 0; k < 5; k++) {
         TEST_ASSERT_FALSE(takes(honest));
     }
@@ -380,9 +381,13 @@ TEST(what_moves_otherwise_than_a_lie_is_compared_with_anew)
     for (unsigned n = 0; n < ROWS(table); n++) {
         step = (circuit_step_t){.was = {before}, .odd = 1, .again = 1};
         const float found_mv = 1e3f * (((float)table[n].ohm_q12 + 0.25f) / 4096.0f + 0.18f);
-        const circuit_window_t window = {
-            found_mv, found_mv * 4096.0f / ((float)table[n].share_q12 + 0.25f), 1e3f, true, true,
-            0.0f};
+        const circuit_window_t window = {.found_mv = found_mv,
+                                         .expected_mv = found_mv * 4096.0f /
+                                                        ((float)table[n].share_q12 + 0.25f),
+                                         .current_ma = 1e3f,
+                                         .tells = true,
+                                         .steady = true,
+                                         .balances = true};
         for (unsigned times = 1; times <= 4; times++) {
             TEST_ASSERT_FALSE(circuit_step_judge(&step, &window, &source, &circuit));
             const bool stays = table[n].stays || times < 2;
@@ -445,16 +450,16 @@ TEST(windows_that_tell_are_kept_within_16_bits)
         circuit_window_t window;
         uint16_t share_q12, ohm_q12;
     } kept[] = {
-        {{400.0f, 400.0f, 1000.0f, true, true, 0.0f}, 4096, 901},
-        {{400.0f, 100.0f, 1000.0f, true, true, 0.0f}, 16384, 901},
-        {{400.0f, 99.9f, 1000.0f, true, true, 0.0f}, 0, 0},
-        {{184.0f, 200.0f, 1000.0f, true, true, 0.0f}, 3768, 16}, /* a step of the register */
-        {{183.9f, 200.0f, 1000.0f, true, true, 0.0f}, 0, 0},
-        {{300.0f, 300.0f, 16.0f, true, true, 0.0f}, 4096, UINT16_MAX},
-        {{300.0f, 300.0f, 15.9f, true, true, 0.0f}, 0, 0},
-        {{60000.0f, 200.0f, 4095.0f, true, true, 0.0f}, UINT16_MAX, 59277},
-        {{60000.0f, 200.0f, 4500.0f, true, true, 0.0f}, UINT16_MAX, 53876},
-        {{400.0f, 400.0f, 1000.0f, false, true, 0.0f}, 0, 0},
+        {{400.0f, 400.0f, 1000.0f, true, true, 0.0f, true}, 4096, 901},
+        {{400.0f, 100.0f, 1000.0f, true, true, 0.0f, true}, 16384, 901},
+        {{400.0f, 99.9f, 1000.0f, true, true, 0.0f, true}, 0, 0},
+        {{184.0f, 200.0f, 1000.0f, true, true, 0.0f, true}, 3768, 16}, /* a step of the register */
+        {{183.9f, 200.0f, 1000.0f, true, true, 0.0f, true}, 0, 0},
+        {{300.0f, 300.0f, 16.0f, true, true, 0.0f, true}, 4096, UINT16_MAX},
+        {{300.0f, 300.0f, 15.9f, true, true, 0.0f, true}, 0, 0},
+        {{60000.0f, 200.0f, 4095.0f, true, true, 0.0f, true}, UINT16_MAX, 59277},
+        {{60000.0f, 200.0f, 4500.0f, true, true, 0.0f, true}, UINT16_MAX, 53876},
+        {{400.0f, 400.0f, 1000.0f, false, true, 0.0f, true}, 0, 0},
     };
     for (unsigned n = 0; n < ROWS(kept); n++) {
         setUp();
@@ -470,7 +475,8 @@ TEST(windows_that_tell_are_kept_within_16_bits)
 static bool takes_behind_a_diode(float current_ma, float spring_ohm)
 {
     const float found_mv = current_ma * (spring_ohm + 0.18f);
-    const circuit_window_t window = {found_mv, found_mv + 350.0f, current_ma, true, true, 0.0f};
+    const circuit_window_t window = {found_mv, found_mv + 350.0f, current_ma, true, true, 0.0f,
+                                     true};
     return circuit_step_judge(&step, &window, &source, &circuit);
 }
 
