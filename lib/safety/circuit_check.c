@@ -120,10 +120,10 @@ static bool stands(const circuit_check_t *c, float swept_mv2, float found_mv)
 static bool moves_alone(float voltage_variance, float follows_mv, float duty_variance,
                         float found_mv)
 {
-    const float by_duty_mv2 =
-        duty_variance >= LEAST_VARIANCE ? follows_mv * follows_mv / duty_variance : 0.0f;
     const float likely_mv = RESTLESS_SHARE * found_mv;
-    return voltage_variance - by_duty_mv2 > likely_mv * likely_mv + RESTLESS_MV * RESTLESS_MV;
+    const float beyond_mv2 = voltage_variance - (likely_mv * likely_mv + RESTLESS_MV * RESTLESS_MV);
+    return duty_variance >= LEAST_VARIANCE ? beyond_mv2 * duty_variance > follows_mv * follows_mv
+                                           : beyond_mv2 > 0.0f;
 }
 
 /* By so much duty of such a supply behind the drop. */
@@ -168,14 +168,15 @@ bool circuit_check_judge(circuit_check_t *c, const circuit_source_t *source, uin
         const float square_mv2 = share * (float)c->voltage_square;
         restless = moves_alone(square_mv2 - found_mv * found_mv, follows_mv, variance, found_mv);
         if (window != NULL) {
-            *window =
-                (circuit_window_t){.found_mv = found_mv,
-                                   .expected_mv = expected_mv,
-                                   .current_ma = 2.0f * share * (float)c->current_2ma,
-                                   .duty = duty,
-                                   .steady = variance < STEADY_SHARE * STEADY_SHARE * duty * duty,
-                                   .tells = true,
-                                   .balances = beyond_mv <= 0.0f};
+            *window = (circuit_window_t){
+                .found_mv = found_mv,
+                .expected_mv = expected_mv,
+                .share = expected_mv >= CIRCUIT_WINDOW_LEAST_MV ? found_mv / expected_mv : 0.0f,
+                .current_ma = 2.0f * share * (float)c->current_2ma,
+                .duty = duty,
+                .steady = variance < STEADY_SHARE * STEADY_SHARE * duty * duty,
+                .tells = true,
+                .balances = beyond_mv <= 0.0f};
         }
     }
     c->astray = counted(c->astray, astray) & 15u;

@@ -47,10 +47,14 @@ static inline bool circuit_check_is_sound(const circuit_check_t *check)
     return check->astray == 0 && check->unbalanced == 0 && check->restless == 0;
 }
 
+/* Below it, offsets are most of what differs. */
+#define CIRCUIT_WINDOW_LEAST_MV 100.0f
+
 /* What a window's voltages were, in the mean. */
 typedef struct {
     float found_mv;    /* behind the switch */
     float expected_mv; /* by duty, supply and drop */
+    float share;       /* what was found of it; 0: too little is expected to tell */
     float current_ma;
     bool tells;    /* there were readings enough */
     bool steady;   /* all at about the same duty */
@@ -58,8 +62,6 @@ typedef struct {
     bool balances; /* its duty brings what was found, with no help of a drop that is not known */
 } circuit_window_t;
 
-/* Below it, offsets are most of what differs. */
-#define CIRCUIT_WINDOW_LEAST_MV 100.0f
 /* It tells what a spring's circuit shows of the voltage that its duty should bring. */
 static inline bool circuit_window_compares(const circuit_window_t *window)
 {

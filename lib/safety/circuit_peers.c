@@ -128,7 +128,7 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
         return own->odd >= CIRCUIT_PEERS_WINDOWS;
     }
     const float expected_mv = window->expected_mv;
-    const float share = window->found_mv / expected_mv;
+    const float share = window->share;
     const float own_part = own->own_q12 != 0 ? (float)own->own_q12 / OWN_Q12 : 1.0f;
     const circuit_peer_t *const other = middle(peers, springs, k);
     const float was_mv = volts_mv((float)own->shown_16mv);
@@ -150,8 +150,11 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
         /* Where offsets make more than what a share may be at the most, it teaches nothing; nor
          * where a drop may that is not known: of the little that is found behind one, what an
          * eighth more of duty brings is most. */
-        const float unsure_mv = source->unsure_mv * (alike ? apart(expected_mv, other_mv) : 1.0f);
-        const bool teaches = unsure_mv <= fminf(others, 1.0f) * (OTHER_PART * told_mv - offsets_mv);
+        const float most_mv = fminf(others, 1.0f) * (OTHER_PART * told_mv - offsets_mv);
+        const float higher_mv = fmaxf(expected_mv, other_mv);
+        const bool teaches = alike
+                                 ? source->unsure_mv * (higher_mv - told_mv) <= most_mv * higher_mv
+                                 : source->unsure_mv <= most_mv;
         good = good && (!was_found(own) || is_like(own, share, others));
         if (!odd && (good || !was_found(own)) && own->learnt < LEARN_MOST && teaches) {
             learn(own, share / others, told_mv / VOLTS_MV);

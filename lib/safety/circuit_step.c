@@ -123,8 +123,7 @@ bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
         step->again = 1;
         return step->odd >= CIRCUIT_STEP_WINDOWS;
     }
-    const circuit_shown_t now = {to_q12(window->found_mv / window->expected_mv),
-                                 to_q12(spring_mv / window->current_ma),
+    const circuit_shown_t now = {to_q12(window->share), to_q12(spring_mv / window->current_ma),
                                  (uint8_t)fminf(window->current_ma / CURRENT_MA, 255.0f)};
     look_back(step, &now);
     circuit_shown_t *const was = &step->was[0];

@@ -22,12 +22,15 @@ void main(void)
     circuit_peers_t peers = {0};
     const circuit_source_t source = any_source();
     while (any_bool()) {
-        const circuit_window_t window = {
+        circuit_window_t window = {
             .found_mv = Frama_C_float_interval(0.0f, MOST_MV),
             .expected_mv = Frama_C_float_interval(0.0f, MOST_MV),
             .tells = any_bool(),
             .balances = any_bool(),
         };
+        if (window.expected_mv >= CIRCUIT_WINDOW_LEAST_MV) {
+            window.share = window.found_mv / window.expected_mv;
+        }
         const uint8_t springs = (uint8_t)any_between(1, CIRCUIT_PEERS_MAX);
         const uint8_t spring = (uint8_t)any_between(0, springs - 1);
         (void)circuit_peers_judge(&peers, springs, spring, &window, &source);

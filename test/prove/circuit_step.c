@@ -16,13 +16,16 @@ void main(void)
     any_circuit(&settings);
     const circuit_source_t source = any_source();
     while (any_bool()) {
-        const circuit_window_t window = {
+        circuit_window_t window = {
             .found_mv = Frama_C_float_interval(0.0f, 13000.0f),
             .expected_mv = Frama_C_float_interval(0.0f, 17000.0f),
             .current_ma = Frama_C_float_interval(0.0f, 4095.0f),
             .tells = any_bool(),
             .steady = any_bool(),
         };
+        if (window.expected_mv >= CIRCUIT_WINDOW_LEAST_MV) {
+            window.share = window.found_mv / window.expected_mv;
+        }
         (void)circuit_step_judge(&step, &window, &source, &settings);
         if (any_bool()) {
             const circuit_source_t now = any_source();

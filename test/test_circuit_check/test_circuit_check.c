@@ -206,7 +206,8 @@ TEST(supply_that_swings_is_found_within_two_seconds)
 TEST(a_window_says_what_its_readings_were)
 {
     for (uint8_t readings = 11; readings <= 29; readings = (uint8_t)(readings + 1u)) {
-        circuit_window_t window = {7.0f, 7.0f, 7.0f, readings < 12, true, 7.0f, true};
+        circuit_window_t window;
+        memset(&window, 7, sizeof window);
         setUp();
         for (unsigned tick = 0; tick < 30; tick++) { /* the first one jumps */
             circuit_check_take(&check, 180, 0, 120, tick <= readings, 1000, 200);
@@ -215,6 +216,7 @@ TEST(a_window_says_what_its_readings_were)
         TEST_ASSERT_EQUAL(readings >= 12, window.tells);
         TEST_ASSERT_FLOAT_WITHIN(0.01f, window.tells ? 375.0f : 0.0f, window.found_mv);
         TEST_ASSERT_FLOAT_WITHIN(0.01f, window.tells ? 750.0f : 0.0f, window.expected_mv);
+        TEST_ASSERT_FLOAT_WITHIN(0.001f, window.tells ? 0.5f : 0.0f, window.share);
         TEST_ASSERT_FLOAT_WITHIN(0.01f, window.tells ? 1000.0f : 0.0f, window.current_ma);
         TEST_ASSERT_FLOAT_WITHIN(0.01f, window.tells ? 120.0f : 0.0f, window.duty);
     }

@@ -19,10 +19,21 @@ void setUp(void)
     source = (circuit_source_t){0};
 }
 
+/* A window that tells, at one duty. */
+static circuit_window_t window_of(float found_mv, float expected_mv)
+{
+    return (circuit_window_t){
+        .found_mv = found_mv,
+        .expected_mv = expected_mv,
+        .share = expected_mv >= CIRCUIT_WINDOW_LEAST_MV ? found_mv / expected_mv : 0.0f,
+        .tells = true,
+        .steady = true,
+        .balances = true};
+}
+
 static bool takes(uint8_t spring, float expected_mv, float share)
 {
-    const circuit_window_t window = {
-        share * expected_mv, expected_mv, 0.0f, true, true, 0.0f, true};
+    const circuit_window_t window = window_of(share * expected_mv, expected_mv);
     return circuit_peers_judge(&peers, SPRINGS, spring, &window, &source);
 }
 
@@ -108,7 +119,8 @@ TEST(what_is_no_share_of_a_supply_is_not_what_it_showed_before)
 {
     for (unsigned doubted = 0; doubted < 2; doubted++) {
         setUp();
-        const circuit_window_t open = {0.0f, HEATS_MV, 0.0f, true, true, 0.0f, false};
+        circuit_window_t open = window_of(0.0f, HEATS_MV);
+        open.balances = false;
         for (unsigned n = 0; n < 4; n++) {
             TEST_ASSERT_FALSE(circuit_peers_judge(&peers, SPRINGS, 0, &open, &source));
         }
@@ -419,8 +431,7 @@ TEST(the_middle_one_of_the_others_counts)
             }
         }
         (void)takes(4, HEATS_MV, 1.95f);
-        const circuit_window_t window = {
-            (odd ? 0.79f : 0.80f) * HEATS_MV, HEATS_MV, 0.0f, true, true, 0.0f, true};
+        const circuit_window_t window = window_of((odd ? 0.79f : 0.80f) * HEATS_MV, HEATS_MV);
         for (unsigned times = 0; times < 3; times++) {
             const bool found = circuit_peers_judge(&peers, 4, asked, &window, &source);
             TEST_ASSERT_EQUAL(odd && times == 2, found);

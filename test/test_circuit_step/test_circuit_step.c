@@ -26,18 +26,26 @@ typedef struct {
 
 static const shown_t honest = {0.9f, 0.219f, 0.18f, 1.0f, 1.0f, 1.0f, 0.0f, 0.0f};
 
+/* A window that tells, at one duty. */
+static circuit_window_t window_of(float found_mv, float expected_mv, float current_ma)
+{
+    return (circuit_window_t){
+        .found_mv = found_mv,
+        .expected_mv = expected_mv,
+        .share = expected_mv >= CIRCUIT_WINDOW_LEAST_MV ? found_mv / expected_mv : 0.0f,
+        .current_ma = current_ma,
+        .tells = true,
+        .steady = true,
+        .balances = true};
+}
+
 static bool takes(shown_t s)
 {
     const float a = (s.shown_a - s.offset_a) / s.current_gain;
     const float behind_mv = 1e3f * a * (s.spring_ohm + s.wiring_ohm);
     const float read_mv = 1e3f * a * s.spring_ohm * s.voltage_gain + s.offset_mv;
-    const circuit_window_t window = {read_mv + 1e3f * s.shown_a * 0.18f,
-                                     behind_mv / s.supply,
-                                     1e3f * s.shown_a,
-                                     true,
-                                     true,
-                                     0.0f,
-                                     true};
+    const circuit_window_t window =
+        window_of(read_mv + 1e3f * s.shown_a * 0.18f, behind_mv / s.supply, 1e3f * s.shown_a);
     return circuit_step_judge(&step, &window, &source, &circuit);
 }
 
@@ -271,7 +279,8 @@ TEST(what_it_showed_before_outlasts_a_short_return)
 /* A window in which the current falls from one to the other is of neither. */
 TEST(a_window_of_two_currents_is_left_out)
 {
-    const circuit_window_t between = {680.0f, 680.0f, 1700.0f, true, false, 0.0f, true};
+    circuit_window_t between = window_of(680.0f, 680.0f, 1700.0f);
+    between.steady = false;
     for (unsigned k = 0; k < 5; k++) {
         TEST_ASSERT_FALSE(takes(honest));
     }
@@ -381,13 +390,8 @@ TEST(what_moves_otherwise_than_a_lie_is_compared_with_anew)
     for (unsigned n = 0; n < ROWS(table); n++) {
         step = (circuit_step_t){.was = {before}, .odd = 1, .again = 1};
         const float found_mv = 1e3f * (((float)table[n].ohm_q12 + 0.25f) / 4096.0f + 0.18f);
-        const circuit_window_t window = {.found_mv = found_mv,
-                                         .expected_mv = found_mv * 4096.0f /
-                                                        ((float)table[n].share_q12 + 0.25f),
-                                         .current_ma = 1e3f,
-                                         .tells = true,
-                                         .steady = true,
-                                         .balances = true};
+        const circuit_window_t window =
+            window_of(found_mv, found_mv * 4096.0f / ((float)table[n].share_q12 + 0.25f), 1e3f);
         for (unsigned times = 1; times <= 4; times++) {
             TEST_ASSERT_FALSE(circuit_step_judge(&step, &window, &source, &circuit));
             const bool stays = table[n].stays || times < 2;
@@ -447,26 +451,30 @@ TEST(found_stays_found_until_it_begins_anew)
 TEST(windows_that_tell_are_kept_within_16_bits)
 {
     static const struct {
-        circuit_window_t window;
+        float found_mv, expected_mv, current_ma;
+        bool tells;
         uint16_t share_q12, ohm_q12;
     } kept[] = {
-        {{400.0f, 400.0f, 1000.0f, true, true, 0.0f, true}, 4096, 901},
-        {{400.0f, 100.0f, 1000.0f, true, true, 0.0f, true}, 16384, 901},
-        {{400.0f, 99.9f, 1000.0f, true, true, 0.0f, true}, 0, 0},
-        {{184.0f, 200.0f, 1000.0f, true, true, 0.0f, true}, 3768, 16}, /* a step of the register */
-        {{183.9f, 200.0f, 1000.0f, true, true, 0.0f, true}, 0, 0},
-        {{300.0f, 300.0f, 16.0f, true, true, 0.0f, true}, 4096, UINT16_MAX},
-        {{300.0f, 300.0f, 15.9f, true, true, 0.0f, true}, 0, 0},
-        {{60000.0f, 200.0f, 4095.0f, true, true, 0.0f, true}, UINT16_MAX, 59277},
-        {{60000.0f, 200.0f, 4500.0f, true, true, 0.0f, true}, UINT16_MAX, 53876},
-        {{400.0f, 400.0f, 1000.0f, false, true, 0.0f, true}, 0, 0},
+        {400.0f, 400.0f, 1000.0f, true, 4096, 901},
+        {400.0f, 100.0f, 1000.0f, true, 16384, 901},
+        {400.0f, 99.9f, 1000.0f, true, 0, 0},
+        {184.0f, 200.0f, 1000.0f, true, 3768, 16}, /* a step of the register */
+        {183.9f, 200.0f, 1000.0f, true, 0, 0},
+        {300.0f, 300.0f, 16.0f, true, 4096, UINT16_MAX},
+        {300.0f, 300.0f, 15.9f, true, 0, 0},
+        {60000.0f, 200.0f, 4095.0f, true, UINT16_MAX, 59277},
+        {60000.0f, 200.0f, 4500.0f, true, UINT16_MAX, 53876},
+        {400.0f, 400.0f, 1000.0f, false, 0, 0},
     };
     for (unsigned n = 0; n < ROWS(kept); n++) {
         setUp();
-        TEST_ASSERT_FALSE(circuit_step_judge(&step, &kept[n].window, &source, &circuit));
+        circuit_window_t window =
+            window_of(kept[n].found_mv, kept[n].expected_mv, kept[n].current_ma);
+        window.tells = kept[n].tells;
+        TEST_ASSERT_FALSE(circuit_step_judge(&step, &window, &source, &circuit));
         TEST_ASSERT_EQUAL_UINT(kept[n].share_q12, step.was[0].share_q12);
         TEST_ASSERT_UINT_WITHIN(1, kept[n].ohm_q12, step.was[0].ohm_q12);
-        const float shown = kept[n].share_q12 != 0 ? kept[n].window.current_ma / 16.0f : 0.0f;
+        const float shown = kept[n].share_q12 != 0 ? kept[n].current_ma / 16.0f : 0.0f;
         TEST_ASSERT_EQUAL_UINT(fminf(shown, 255.0f), step.was[0].current_16ma);
     }
 }
@@ -475,8 +483,7 @@ TEST(windows_that_tell_are_kept_within_16_bits)
 static bool takes_behind_a_diode(float current_ma, float spring_ohm)
 {
     const float found_mv = current_ma * (spring_ohm + 0.18f);
-    const circuit_window_t window = {found_mv, found_mv + 350.0f, current_ma, true, true, 0.0f,
-                                     true};
+    const circuit_window_t window = window_of(found_mv, found_mv + 350.0f, current_ma);
     return circuit_step_judge(&step, &window, &source, &circuit);
 }
 
