@@ -20,7 +20,7 @@
  * that was fully on has cooled faster than its ends could go ahead. */
 #define PART_POWER_W 0.15f
 #define PART_LEAST   (2.0f * LEVEL_BAND)
-#define PART_MOST    0.8f /* what is left then, a fifth, takes up no more than a hold's margin */
+#define PART_MOST    0.8f /* surely: a fifth that is left takes up no more than a hold's margin */
 
 #define LOST          0.004f /* phase lost: it is heated back */
 #define SEARCH_SD_K   3.0f   /* a distance known so badly is worth a search */
@@ -139,8 +139,8 @@ static void enter(drive_policy_t *policy, const drive_policy_input_t *in, uint8_
     supply_queue_remove(&policy->queue, k);
     s->floor_ma = s->stage == DRIVE_POLICY_STAGE_HOLD ? s->wanted_ma : 0; /* until its turn */
     if (s->stage != DRIVE_POLICY_STAGE_OFF && spring_estimator_sees(belief_of(in, k))) {
-        const float phase = phase_of(in, k);
-        s->partly = phase > PART_LEAST && phase < PART_MOST;
+        const spring_bounds_t phase = spring_estimator_austenite(in->belief, in->model, k);
+        s->partly = phase.value > PART_LEAST && phase.low < PART_MOST;
     } else if (spring_estimator_possible(belief_of(in, k)) == SPRING_PHASE_MARTENSITE) {
         s->partly = false; /* before that: as it was left */
     }
