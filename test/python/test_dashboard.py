@@ -624,7 +624,7 @@ def anything(draw: random.Random) -> str | bytes:
     return draw.choice([text, text, text, text[:cut], text[:cut] + chr(draw.randrange(1, 0xD000)) + text[cut + 1 :]])
 
 
-@pytest.mark.parametrize("kind", ["fake", pytest.param("simulated", marks=needs_board)])
+@pytest.mark.parametrize("kind", ["fake", pytest.param("simulated", marks=[needs_board, pytest.mark.nightly])])
 def test_whatever_pages_send_the_board_stays_and_off_is_answered(kind: str, tmp_path: Path) -> None:
     draw, board = random.Random(15), FakeBoard()
     board.stream, board.every_s = Rows(), 0.1

@@ -78,6 +78,7 @@ def test_two_effects_that_hide_one_another_are_both_found(make_log) -> None:
     assert set(names(diagnosis.diagnose(Array(), runs).result)) == set(both)
 
 
+@pytest.mark.nightly
 def test_each_spring_is_its_own_beside_a_law_of_all(make_log) -> None:
     """Springs that lie 4 % apart: one name of one spring or its thermometer after the other stood in for them."""
     losses = (1.04, 0.96, 0.97, 0.96, 1.02, 0.97, 1.06, 1.05, 0.97)
@@ -118,6 +119,7 @@ def test_what_is_not_believed_leaves_its_place_to_another(make_log, monkeypatch:
     assert names(result) and "natural_convection" not in names(result)
 
 
+@pytest.mark.nightly
 def test_what_no_effect_explains_is_called_unexplained(make_log) -> None:
     def gusts(columns: dict[str, np.ndarray]) -> None:
         for k in range(1, 10):

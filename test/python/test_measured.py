@@ -65,6 +65,7 @@ def declared() -> Model:
     return model
 
 
+@pytest.mark.nightly
 def test_a_glitch_is_handled_and_an_unlogged_drift_is_no_name_but_noise_that_lasts(
     measured: Path, tmp_path: Path
 ) -> None:

@@ -51,6 +51,7 @@ def crosstalk(columns: dict[str, np.ndarray]) -> None:
     astray(columns, extra)
 
 
+@pytest.mark.nightly
 def test_a_known_effect_is_named_beside_heat_that_goes_astray(make_log) -> None:
     found = diagnosed(make_log, effects=EDGES, change=crosstalk)
     (named,) = found["effects"]
@@ -86,6 +87,7 @@ def drying(columns: dict[str, np.ndarray]) -> None:
     del columns["ambient_c"]
 
 
+@pytest.mark.nightly
 def test_a_cause_that_stood_for_names_is_taken_as_it_is_by_the_numbers_that_it_had_spoilt(
     make_log, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -264,6 +266,7 @@ def test_nothing_without_a_name_where_the_library_explains_all(make_log) -> None
     assert found["unnamed"] == [] and not found["unexplained"]
 
 
+@pytest.mark.nightly
 def test_a_trickle_of_heat_is_no_thermometer_with_an_offset(make_log) -> None:
     """What the library would take for a false thermometer is told as what it is, where that explains more."""
 
