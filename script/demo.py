@@ -40,8 +40,6 @@ INK = "#010203"
 MARTENSITE_START_C, AUSTENITE_START_C = 78.0, 88.0
 EFFECT, EDGE_LOSS = "edge_loss", 0.25
 PLAN_S, DRIVE_S, HELD_S, REST_S = 600, 300, 100, 600
-COOL_S = 300
-"""Six time constants. Of springs that were warm at an upload the board goes by the more careful of both models, and trips early."""
 START_S = 60
 """By then what was believed of warm springs beside wrong numbers, before an upload, has gone: errors are told from then on."""
 DRIVE_STEPS = """policy precompensate
@@ -286,9 +284,7 @@ def undeclared() -> str:
         traces = {"before": read(record(ports, "before", drive_steps, DRIVE_S))}
         run(NINESPRING, "diagnose", measured, "-o", OUT / "diagnosis")
         run(NINESPRING, "export", "--model", OUT / "diagnosis" / "model.toml", "-o", OUT / "settings.txt")
-        run(NINESPRING, "upload", "--port", ports[0], OUT / "settings.txt")
-        (OUT / "cooling.txt").write_text("off all\n", encoding="utf-8")
-        record(ports, "cooling", OUT / "cooling.txt", COOL_S)
+        run(NINESPRING, "upload", "--port", ports[0], "--wait", OUT / "settings.txt")
         traces["after"] = read(record(ports, "after", drive_steps, DRIVE_S))
     model = tomllib.loads((OUT / "diagnosis" / "model.toml").read_text(encoding="utf-8"))
     found = {p["name"]: p for p in model["parameter"] if p.get("effect") == EFFECT}.get(f"{EFFECT}_fraction")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import ninespring as ns
 import pytest
 from command import ended as ninespring
-from fake_board import FakeBoard
+from fake_board import FakeBoard, row
 from ninespring.io import history
 
 HAD = {"rows": "3", "loss_w_per_k": "0.005800", "loss_scale_1": "1.000", "ambient_c": "21.00"}
@@ -52,6 +53,34 @@ def test_an_upload_is_taken_back_and_the_one_before_it_next(fake: FakeBoard, tmp
 def test_an_upload_sends_settings_reads_them_back_and_saves(fake: FakeBoard, tmp_path: Path) -> None:
     upload(fake, tmp_path, "# from model.toml", "$loss_scale_1=1.100", "$loss_w_per_k=0.006000")
     assert fake.sent()[-5:] == ["learnt clear", "$loss_scale_1=1.100", "$loss_w_per_k=0.006000", "$$", "$save"]
+
+
+def believed(*warm_c: float) -> list[str]:
+    """A board's answer to `model`: springs 1 ... as warm as that, and one of which nothing is known yet."""
+    each = [*map(str, warm_c), "68.6"]
+    told = [
+        f"spring {k}: {t} degC, 7.0 to 117.3, 9.4 K below martensite start (+-9.1), austenite 0.0 %, 0.0 to 7.8"
+        for k, t in enumerate(each, 1)
+    ]
+    return [*told, "  not known for 81 s: it may still be hot from before power-on", "ambient: 20.00 degC", "ok"]
+
+
+def test_an_upload_says_which_springs_are_warm_or_waits_until_none_is(fake: FakeBoard, tmp_path: Path) -> None:
+    (tmp_path / "s.txt").write_text("$loss_w_per_k=0.006000\n")
+    fake.answers["model"] = believed(87.4, 24.9, 25.4)
+    code, said = ninespring("upload", "--port", fake.port, tmp_path / "s.txt")
+    assert (code, "spring 1 (87 degC), spring 3 (25 degC): a drive may end in fault 9" in said) == (0, True), said
+
+    def cools() -> Iterator[str]:
+        for k in range(20):
+            if k == 3:
+                fake.answers["model"] = believed(24.0, 24.0, 24.0)
+            yield row(k)
+
+    fake.stream, fake.every_s = cools(), 0.05
+    code, said = ninespring("upload", "--wait", "--port", fake.port, tmp_path / "s.txt")
+    assert (code, "fault 9" in said) == (0, False), said
+    assert fake.sent()[-4:] == ["learnt clear", "$loss_w_per_k=0.006000", "$$", "$save"]
 
 
 @pytest.mark.parametrize(

@@ -181,10 +181,11 @@ def upload(port: str, settings: str, save: bool = True) -> int:
     """Send console lines (`chip_settings(model).lines`) to a board, read them back, save them: `ninespring upload`.
 
     Return how many. WorkError, and nothing is saved, where the board refuses one or shows another value. What was saved can be
-    taken back: `undo_upload`.
+    taken back: `undo_upload`. Where springs are warm a drive may end in fault 9: `Board.cool` waits.
     """
     given = settings_in(settings, "settings")
-    history.send(port, given, "ns.upload", save)
+    with Board(port, off_at_end=False) as board:
+        history.send(board, given, "ns.upload", save)
     return len(given)
 
 

@@ -98,35 +98,45 @@ def record(
 @command("""\b
 Examples:
   ninespring upload --port /dev/ttyACM0 settings.txt
+  ninespring upload --port /dev/ttyACM0 --wait settings.txt
   ninespring upload --port /dev/ttyACM0 --undo
 """)
 @click.argument("settings", type=FILE, required=False)
 @PORT
 @click.option("--undo", is_flag=True, help="give the board back what it had before the last upload from this computer")
 @click.option("--save/--no-save", default=True, help="keep them in the EEPROM")
+@click.option("--wait", is_flag=True, help="first wait until the board believes its springs cold")
 @JSON
-def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: Path | None) -> None:
+def upload(settings: Path | None, port: str, undo: bool, save: bool, wait: bool, json_path: Path | None) -> None:
     """Send exported settings to a board, read them back, save them.
 
     Nothing is saved unless the board took every line and shows every value in `$$`. What the board has learnt of its
-    springs it has learnt beside its old numbers, and forgets. All springs must be off. What it had before is kept on this
-    computer: `ninespring settings history` shows it, --undo gives it back.
+    springs it has learnt beside its old numbers, and forgets. All springs must be off, and should be cold: --wait waits. What it
+    had before is kept on this computer: `ninespring settings history` shows it, --undo gives it back.
     """
     if (settings is None) != undo:
         raise InputError("give either a file of settings or --undo")
-    if settings is None:
-        with working("giving back"), Board(port, off_at_end=False) as board:
+    given = read_settings(settings) if settings else None
+    with working("sending", len(given) if given else None) as say, Board(port, off_at_end=False) as board:
+        if wait:
+            board.cool(say)
+        warm = board.warm()
+        if settings and given:
+            history.send(board, given, f"upload {settings.name}", save, say)
+            result = results.Upload(settings=len(given), saved=save)
+            said = [f"{len(given)} settings sent and read back"]
+        else:
             last = history.undo(board, save)
-        result = results.Upload(settings=len(last.sent), saved=save, undone=last.by)
-        said = [*last.words(back=True), f"`{last.by}` of {last.when} is taken back"]
-    else:
-        given = read_settings(settings)
-        with working("sending", len(given)) as say:
-            history.send(port, given, f"upload {settings.name}", save, say)
-        result = results.Upload(settings=len(given), saved=save)
-        said = [f"{len(given)} settings sent and read back"]
+            result = results.Upload(settings=len(last.sent), saved=save, undone=last.by)
+            said = [*last.words(back=True), f"`{last.by}` of {last.when} is taken back"]
     write({json_path: results.checked(result)})
     out.print("\n".join(said) + (", saved" if save else ""))
+    if warm:
+        err.print(
+            f"warm, as the board believes: {', '.join(f'spring {k} ({t:.0f} degC)' for k, t in warm.items())}: a drive may end in "
+            "fault 9 until they have cooled, some four minutes after they were on (--wait waits for that before it sends)",
+            soft_wrap=True,
+        )
 
 
 @command("""\b

@@ -85,6 +85,10 @@ class Reading:
         )
 
 
+WARM_K = 5.0
+"""Above the room: then the board calls a spring warm itself, and does not believe that it loses more than was declared before."""
+
+
 class Board:
     """A board at a serial port. Leaving its `with` block switches all springs off.
 
@@ -396,6 +400,22 @@ class Board:
     def fan(self, percent: float) -> None:
         """Set the fan, 0..100 percent."""
         self.ask(f"fan {percent:g}")
+
+    def warm(self) -> dict[int, float]:
+        """Return which springs are warm by what the board gave them, and as how warm it believes them, degC."""
+        told = self.ask("model")
+        unknown = {k for k, one in beliefs(told).items() if one.unknown_s is not None}
+        each = re.findall(r"^(?:spring )?(\w+): (-?[\d.]+) degC", "\n".join(told), re.MULTILINE)
+        limit_c = next((float(t) for name, t in each if name == "ambient"), math.inf) + WARM_K
+        return {int(k): float(t) for k, t in each if k.isdigit() and int(k) not in unknown and float(t) > limit_c}
+
+    def cool(self, say: Callable[[str], None] = lambda words: None) -> None:
+        """Wait until no spring is warm; what the board has learnt it forgets. WorkError where one is on."""
+        self.ask("learnt clear", 10.0)
+        for _ in self.stream(1):
+            if not (warm := self.warm()):
+                return
+            say(f"waiting until the springs are cold: the hottest is at {max(warm.values()):.0f} degC")
 
     def read(self) -> Reading:
         """Return what the board measures now, and what it believes of the springs."""

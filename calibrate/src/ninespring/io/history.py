@@ -92,18 +92,17 @@ def _read(path: Path) -> Entry:
 
 
 def send(
-    port: str,
+    board: Board,
     settings: Mapping[str, str],
     by: str,
     save: bool = True,
     say: Callable[[str, int], None] = lambda line, count: None,
 ) -> None:
     """Send settings to a board, read them back, save them; what it had before is kept, where they are saved."""
-    with Board(port, off_at_end=False) as board:
-        before = board.settings()
-        send_settings(board, settings, save, say)
-        if save:
-            keep(port, board.version[0], by, before, settings)
+    before = board.settings()
+    send_settings(board, settings, save, say)
+    if save:
+        keep(board.port, board.version[0], by, before, settings)
 
 
 def undo(board: Board, save: bool = True) -> Entry:
