@@ -388,15 +388,38 @@ static void map_shares(mapping_t *m)
     }
 }
 
-static const char *reason_of(thermal_model_status_t status)
+/* Of a number that is within its own limits, and not within those that follow from others. */
+static const char *range_of(uint16_t bad)
+{
+    switch (bad) {
+    case PARAMETER_heat_capacity_j_per_k:
+        return "too small: a spring, its scale included, has 0.0132 J/K at least";
+    case PARAMETER_martensite_start_c:
+    case PARAMETER_austenite_finish_c:
+        return "too near or too far: a transformation is 2 to 100 K wide";
+    case PARAMETER_latent_heat_j:
+        return "too large: over the heat capacity it is at most 80 K, 20 widths of the "
+               "transformation, and what is left from austenite_finish_c to 200 degC";
+    case PARAMETER_transformation_shift_k:
+        return "too large: the transformation lies within -30 to 200 degC, latent heat included";
+    case PARAMETER_wake_w_per_k:
+        return "too large: it is at most loss_fan_w_per_k";
+    default:
+        return "outside its limits";
+    }
+}
+
+static const char *reason_of(thermal_model_status_t status, uint16_t bad)
 {
     switch (status) {
     case THERMAL_MODEL_ERROR_RANGE:
-        return "outside its limits";
+        return range_of(bad);
     case THERMAL_MODEL_ERROR_OVERFLOW:
-        return "too large: heat flows would overflow";
+        return "too large: a spring's loss, and its couplings with the plate, are at most 0.0655 "
+               "W/K each, both with wake and radiation 0.098";
     case THERMAL_MODEL_ERROR_UNSTABLE:
-        return "too fast for the model's step of 0.1 s";
+        return "too small for the model's step of 0.1 s: that times all conductances is at most "
+               "half of it";
     case THERMAL_MODEL_ERROR_ORDER:
         return "out of order (M_f < M_s <= A_s < A_f)";
     case THERMAL_MODEL_OK:
@@ -457,7 +480,7 @@ chip_mapping_status_t chip_mapping_from_part(const plant_t *plant, int row, int 
     const thermal_model_status_t status = thermal_model_init(&model, &m.chip, &bad);
     if (status != THERMAL_MODEL_OK) {
         message[0] = '\0';
-        say(&m, "%s is %s", parameter_row(bad).name, reason_of(status));
+        say(&m, "%s is %s", parameter_row(bad).name, reason_of(status, bad));
         return CHIP_MAPPING_ERROR_MODEL;
     }
     for (size_t k = 0; k < EFFECT_COUNT; k++) {

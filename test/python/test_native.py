@@ -116,6 +116,25 @@ def test_a_part_lies_within_its_plant(part: native.Part) -> None:
         native.chip_export(native.Plant(3, 3), part)
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "limits"),
+    [
+        ("heat_capacity_j_per_k", 0.01, "has 0.0132 J/K at least"),
+        ("martensite_finish_c", 77.5, "2 to 100 K wide"),
+        ("latent_heat_j", 30.0, "at most 80 K"),
+        ("orthogonal_w_per_k", 0.05, "at most 0.0655 W/K"),
+    ],
+)
+def test_a_number_that_does_not_fit_the_others_on_the_chip_says_its_limits(
+    name: str, value: float, limits: str
+) -> None:
+    plant = native.Plant(2, 2)
+    plant.set_effects({"latent_heat"})
+    plant.set(name, value)
+    with pytest.raises(WorkError, match=limits):
+        native.chip_export(plant)
+
+
 @pytest.mark.parametrize("count", [1, 8, 10])
 def test_first_temperatures_are_of_every_spring(count: int) -> None:
     with pytest.raises(ValueError, match=r"^first_c has shape .* wanted \(9,\)$"):
