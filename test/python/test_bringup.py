@@ -234,6 +234,8 @@ def test_what_no_sensor_tells_is_asked(bench: Make) -> None:
     for step, found in (("supply", "the relay does not follow"), ("air", "the fan does not follow D11")):
         assert made.finds(step, lambda question: False)[0].startswith(found)
         assert made.finds(step) == []
+    made.board.ask("ambient 50")  # as warm as a room may be: it is told a kelvin otherwise, and within the limits
+    assert made.finds("air") == []
 
 
 def test_a_page_that_is_not_its_own_is_refused(bench: Make, tmp_path: Path) -> None:

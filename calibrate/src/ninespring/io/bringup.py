@@ -400,8 +400,9 @@ def step_air(board: Board, step: Step, hands: Hands | None) -> None:
     board.ask("$ambient_source=1")
     try:
         air = rows(board, 0.2)[-1].ambient_c
-        board.ask(f"ambient {believed + 1.0:g}")  # where nothing is read, the setting is what is shown
-        follows = abs(rows(board, 0.2)[-1].ambient_c - air - 1.0) < 0.2
+        other = believed + (1.0 if believed < 20.0 else -1.0)  # within the limits of ambient_c
+        board.ask(f"ambient {other:g}")  # where nothing is read, the setting is what is shown
+        follows = abs(rows(board, 0.2)[-1].ambient_c - air - other + believed) < 0.2
     finally:
         board.ask(f"ambient {believed:g}")
         board.ask(f"$ambient_source={source}")
