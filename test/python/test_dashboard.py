@@ -23,6 +23,7 @@ from command import process
 from fake_board import TELEMETRY, FakeBoard, row
 from made import ROOT, needs_board
 from ninespring.dashboard import server, source
+from ninespring.dashboard.replay_source import ReplaySource
 from ninespring.io import words
 from ninespring.io.belief import Belief, beliefs
 from ninespring.io.logs import read_log, read_table
@@ -593,6 +594,18 @@ def test_a_stop_of_a_replay_says_that_it_pauses(make_log, tmp_path: Path) -> Non
         got = answer_to(socket, {"do": "all", "level": 0, "id": 2})
         assert got["why"] == "'all' is nothing that a log that is replayed can do"
         assert answer_to(socket, {"do": "seek", "time_s": 1e8, "id": 3})["kind"] == "done"
+
+
+def test_a_replay_is_paused_at_its_end_and_played_once_more_from_its_beginning(make_log) -> None:
+    replay = ReplaySource(read_log(make_log(seconds=20)), 3, 3, None, 1000.0)
+    replay.start()
+    while replay.state()["time_s"] < 19.0:
+        time.sleep(0.05)
+    assert (replay.state()["playing"], replay.state()["state_words"]) == (False, "paused, 1000 x")
+    replay.do({"do": "speed", "speed": 0.01})
+    replay.do({"do": "pause"})
+    assert (replay.state()["playing"], replay.state()["time_s"]) == (True, 0.0)
+    replay.close()
 
 
 WORDS = "on off pattern model faults clear policy fan $rows $$ $ ? learnt # help"

@@ -82,8 +82,12 @@ class ReplaySource(Source):
     def do(self, wish: dict[str, Any]) -> Future[str]:
         """Play, pause, seek, or change the speed."""
         with self._moved:
-            if wish["do"] == "seek":
-                self._at_s = float(np.clip(wish["time_s"], self._run.time_s[0], self._run.time_s[-1]))
+            to_s = wish.get("time_s")
+            if wish["do"] == "pause":
+                to_s = -np.inf if self._ended(self._row) else None  # once more
+                self._playing = to_s is not None or not self._playing
+            if to_s is not None:
+                self._at_s = float(np.clip(to_s, self._run.time_s[0], self._run.time_s[-1]))
                 row = int(np.searchsorted(self._run.time_s, self._at_s, "right")) - 1
                 with self._lock:
                     self._forget()
@@ -92,10 +96,11 @@ class ReplaySource(Source):
                 self._show(row)
             elif wish["do"] == "speed":
                 self._speed = wish["speed"]
-            else:
-                self._playing = not self._playing
         self._show(self._row)
         return at_once("")
+
+    def _ended(self, row: int) -> bool:
+        return row == len(self._run.time_s) - 1
 
     def _values(self, row: int) -> dict[str, Any]:
         return {name: plain(values[row]) for name, values in self._columns.items()} | {
@@ -105,15 +110,16 @@ class ReplaySource(Source):
     def _show(self, row: int) -> None:
         values = self._values(row)
         run = self._run
+        playing = self._playing and not self._ended(row)
         self._change(
             **values,
             fan=float(run.fan[row]),
             ambient_c=None if run.ambient_c is None else float(run.ambient_c[row]),
             level=[100.0 if one > 0 else 0 for one in run.drive[row]],
             sum_a=float(np.nansum(self._columns["current_a"][row])),
-            state_words=("playing" if self._playing else "paused") + f", {self._speed:g} x",
+            state_words=("playing" if playing else "paused") + f", {self._speed:g} x",
             speed=self._speed,
-            playing=self._playing,
+            playing=playing,
         )
         if row != self._row:
             self._remember(values)
@@ -124,7 +130,7 @@ class ReplaySource(Source):
         while not self.closing.wait(TICK_S):
             now = time.monotonic()
             with self._moved:
-                if self._playing and self._row < len(self._run.time_s) - 1:
+                if self._playing and not self._ended(self._row):
                     self._at_s += (now - before) * self._speed
                     last = int(np.searchsorted(self._run.time_s, self._at_s, "right")) - 1
                     for row in range(self._row + 1, last):
