@@ -47,6 +47,8 @@ SLOW = "".join(f"{500 * n},{n // 100 % 2},{20.0 + 0.1 * (n % 7):g}\n" for n in r
         ("0,1,20\n1,1,20\n2,1,20\n", 1, "column names"),
         (HEADER + "0,1,20\n1,1,20\n" + HEADER + "0,1,20\n", 4, "two logs"),
         ("\ufeff".encode("utf-16-le").decode("latin-1") + "t\0i\0", 1, "UTF-16"),
+        ("PK\x03\x04\x14\0", None, "unpack it"),
+        ("\x1f\x8b\x08\0", None, "unpack it"),
         (HEADER + "0,1,20\n1,1,-127\n2,1,20\n", 3, "leave the cell empty"),
         (HEADER + "0,1,20\n1,1,20\n1,1,21\n2,1,20\n", 4, "rise"),
         (HEADER + "0,1,20\n1,1,20\n0.5,1,21\n", 4, "rise"),

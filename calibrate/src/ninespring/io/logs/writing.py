@@ -133,6 +133,8 @@ def write_atomically(files: Mapping[Path, str | bytes], force: bool = False) -> 
             temporary.unlink(missing_ok=True)
 
 
+PACKED = (b"PK\3\4", b"\x1f\x8b", b"BZh", b"\xfd7zXZ\0")
+"""What a packed file begins with."""
 _once = functools.cache(lambda path: Path(path).read_bytes())
 """What comes through a pipe, which can be read once, and is looked at several times."""
 
@@ -148,6 +150,8 @@ def read_bytes(path: str | Path) -> bytes:
 def read_text(path: str | Path) -> str:
     """Return a text file, each line ended by a line feed; what is not UTF-8, with or without byte order mark, is refused."""
     raw = read_bytes(path)
+    if raw.startswith(PACKED):
+        raise InputError("is packed (.zip, .gz, .bz2, .xz, a spreadsheet's .xlsx): unpack it, or save it as CSV", path)
     if b"\0" in raw:
         kind = "UTF-16 text" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "not a text file (it holds NUL bytes)"
         raise InputError(f"{kind}: save it as UTF-8 text", path, 1)
