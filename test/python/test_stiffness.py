@@ -181,6 +181,20 @@ def test_what_knows_one_layer_refuses_two(tmp_path: Path) -> None:
         read_log(log)
 
 
+@pytest.mark.parametrize(
+    "words", [["plan", "--array"], ["calibrate", "--simulate", "--yes", "--array"], ["export", "--model"]]
+)
+def test_what_knows_one_board_refuses_an_array_on_several(tmp_path: Path, words: list[str]) -> None:
+    model = Model(Array(4, 4, board=(2, 2)))
+    path = tmp_path / "array.toml"
+    path.write_text(
+        model_text(model) if "--model" in words else "[array]\nrows=4\ncols=4\nboard_rows=2\nboard_cols=2\n"
+    )
+    code, said = ended(*words, path, "-o", tmp_path / "out")
+    assert code == 2 and "an array on 4 boards" in said and "(rows = 2, cols = 2)" in said
+    assert not (tmp_path / "out").exists()
+
+
 @needs_simulator
 def test_a_picture_has_both_layers_side_by_side(tmp_path: Path) -> None:
     ini = tmp_path / "two.ini"

@@ -80,6 +80,7 @@ def calibrate(
     kept = output / ARRAY_FILE if begun and (output / ARRAY_FILE).exists() else array_path
     array = read_array(kept) if kept else Array()
     array.one_layer("a board drives")
+    array.one_board("this calibrates")
     if wanted["pattern"] is not None:
         pattern_of(str(wanted["pattern"]), array)
     if output.is_dir() and not begun and any(output.iterdir()):

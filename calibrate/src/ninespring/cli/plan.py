@@ -68,6 +68,7 @@ def plan(
     model, given = model_and_array(model_path, array_path)
     array = given or Array()
     array.one_layer("a plan is for")
+    array.one_board("a plan is for")
     head = []
     duration = duration or (1800.0 if board_alone else 900.0)
     current = current or (2.6 if board_alone else 2.0)

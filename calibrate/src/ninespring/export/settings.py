@@ -164,7 +164,8 @@ def _moved(plant: native.Plant, name: str) -> native.Plant:
 
 
 def settings_of(model: Model) -> Settings:
-    """Return the settings that a model determines; refused (WorkError) where one does not fit the chip."""
+    """Return the settings that a model determines; refused (WorkError) where one does not fit the chip, InputError where it has several."""
+    model.array.one_board("settings are of")
     why = determined(model)
     declared = array_parameters(model.array)
     told = {name: value for name, value in model.parameters.items() if not why.get(name)}

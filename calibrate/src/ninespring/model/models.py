@@ -109,8 +109,17 @@ class Array:
                 "and an array or model without [stiffness]"
             )
 
+    def one_board(self, who: str) -> None:
+        """Refuse a layer on several boards where only one board is known."""
+        if (boards := len(self.parts) // self.layers) > 1:
+            rows, cols = self.board or (self.rows, self.cols)
+            raise InputError(
+                f"an array on {boards} boards, but {who} one, whose log and settings count its springs from 1: describe each "
+                f"board's springs as an array of their own, without board_rows (rows = {rows}, cols = {cols})"
+            )
+
     def of_layer(self, layer: str) -> Array:
-        """Return one layer alone: its springs, where `[stiffness]` says nothing those above; no boards, nothing of the other."""
+        """Return one layer alone: its springs, where `[stiffness]` says nothing those above; nothing of the other."""
         own = (self.stiffness or {}) if stiffness.LAYERS.index(layer) else {}
         return Array(
             self.rows,
@@ -119,6 +128,7 @@ class Array:
             self.spring | {key: own[key] for key in SPRING_KEYS if key in own},
             self.material | {key: own[key] for key in stiffness.MATERIAL if key in own},
             self.sensor,
+            board=self.board,
         )
 
     @property
