@@ -63,6 +63,19 @@ def interrupted(folder: Path, name: str, rows: int, how: signal.Signals, *words:
     return running.returncode, said
 
 
+@needs_board
+def test_a_simulated_board_has_the_array_that_is_declared_and_a_wrong_port_is_no_beginning(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Calibration, "run", Calibration._look_at_the_board)
+    (tmp_path / "a.toml").write_text("[array]\nrows = 1\ncols = 4\n[spring]\nwire_diameter_mm = 0.5\n")
+    words = ("--yes", "--array", tmp_path / "a.toml", "-o", tmp_path / "folder")
+    code, said = ended("calibrate", "--port", "/dev/none", "--thermometers", "/dev/none2", *words)
+    assert (code, "/dev/none: cannot be opened" in said) == (1, True), said
+    code, said = ended("calibrate", "--simulate", *words)
+    assert code == 0, said
+
+
 @pytest.mark.nightly
 @needs_board
 def test_a_board_learns_its_array_in_one_command_that_is_stopped_and_killed_on_the_way(

@@ -13,6 +13,7 @@ from ..io import ranges
 from ..io.board import SIMULATED, Board
 from ..io.logs import write_atomically
 from ..model.models import Array, pattern_of, read_array
+from ..model.simulate import array_parameters
 from .calibration.chain import Calibration
 from .calibration.progress import FILE, Progress
 from .calibration.report import page
@@ -83,7 +84,7 @@ def calibrate(
     array.one_board("this calibrates")
     if wanted["pattern"] is not None:
         pattern_of(str(wanted["pattern"]), array)
-    if output.is_dir() and not begun and any(output.iterdir()):
+    if output.is_dir() and not begun and {one.name for one in output.iterdir()} - {ARRAY_FILE}:
         raise InputError("is there, and no calibration was begun in it: give another folder, -o", output)
     # another array in its place would be another calibration
     given = {"simulate": simulate, "array": array_path.read_text("utf-8") if array_path else None, **wanted}
@@ -103,7 +104,13 @@ def calibrate(
         return yes or click.confirm(text, default=False)
 
     try:
-        with Board(port or SIMULATED, simulated=UNKNOWN) as board:
+        declared = {"array.rows": array.rows, "array.cols": array.cols}
+        declared |= {f"plant.{name}": value for name, value in array_parameters(array).items()}
+        words = [word for name, value in declared.items() for word in ("--set", f"{name}={value}")]
+        with Board(port or SIMULATED, simulated=(*UNKNOWN, *words)) as board:
+            if simulate:
+                board.ask(f"$rows={array.rows}")
+                board.ask(f"$columns={array.cols}")
             Calibration(progress, array, board, thermometers or board.thermometers, ask, tell).run()
     except KeyboardInterrupt:
         raise WorkError(f"stopped; what was measured is in {output}: the same command goes on from there") from None
