@@ -8,6 +8,7 @@ import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import nullcontext
+from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -287,6 +288,13 @@ def test_settings_are_saved_if_the_board_drives_no_worse_with_them_and_taken_bac
     # asked again it says the same, and drives nothing
     again = Told(tmp_path)
     assert says in again.run() and not again.asked
+
+
+def test_of_springs_that_a_fault_kept_cold_no_error_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    told = until_export(tmp_path, [measured()], monkeypatch)
+    cold = asdict(measured(held=0.0, error_c=0.8))
+    told.progress.keep("before", {"log": "before.csv", "faults": ["fault 15 sensor_mismatch"], **cold})
+    assert told.run() == "" and "$save" in told.fake.sent()
 
 
 def test_springs_are_cold_once_the_board_that_heated_them_says_so(
