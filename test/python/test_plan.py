@@ -67,6 +67,13 @@ def test_without_a_thermometer_every_spring_crosses_often_and_none_is_ever_witho
     assert (fan == 0.5).mean() > 0.09
 
 
+def test_without_a_thermometer_thin_wire_that_never_transforms_is_refused_and_planned_with_less_current() -> None:
+    thin = Array(1, 4, spring={"wire_diameter_mm": 0.6, "coil_diameter_mm": 4.0, "turns": 9.0})
+    with pytest.raises(InputError, match=r"with 2.6 A a spring comes to \d+ degC at most.*of thin wire less"):
+        plan.make_plan(thin, 1800.0, 2.6, 14.0, 105.0, board_alone=True)
+    assert plan.make_plan(thin, 1800.0, 1.5, 14.0, 105.0, board_alone=True).share_on.min() > 0.2
+
+
 def test_what_was_planned_identifies_the_array(tmp_path: Path) -> None:
     made = plan.make_plan(Array(), 900.0, 2.0, 14.0, 105.0)
     current, fan = driven(script_lines("\n".join(made.steps), "steps.txt"), 9, 900, 2.0)

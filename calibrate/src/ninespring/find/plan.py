@@ -31,6 +31,8 @@ COOL_FROM = 0.88
 """Part of the duration."""
 RESTING_A = 0.25
 """A spring's current at rest where v / i is all there is: a quarter more than what v / i is read from."""
+THROUGH = 0.8
+"""Of the way from austenite start to finish: nine tenths of a spring have transformed."""
 BACK_OFF_S = 5.0
 THROUGH_S, BEYOND_K = 240.0, 1.0
 """A spring is driven so long at the most to pass its transformation, and so far beyond its end."""
@@ -103,6 +105,13 @@ def make_plan(
         drive, temperature = simulated()
     else:
         raise InputError(f"no plan keeps the springs below {hottest_c:g} degC with {current_a:g} A: lower the current")
+    plant, least_c = _declared(array), float(temperature.max(axis=0).min())
+    start_c, finish_c = plant.get("austenite_start_c"), plant.get("austenite_finish_c")
+    if board_alone and least_c < start_c + THROUGH * (finish_c - start_c):
+        raise InputError(
+            f"with {current_a:g} A a spring comes to {least_c:.0f} degC at most, and v / i is read by the transformation, which "
+            f"ends at {finish_c:g}: another current (of thin wire less), or a hotter limit than {hottest_c:g}"
+        )
     return Plan(
         steps=_lines(array.springs, stretches, duration_s, current_a, resting, fan),
         hottest_c=float(temperature.max()),
@@ -236,10 +245,14 @@ def _simulated(
 
 def _temperatures(array: Array, drive: np.ndarray, fan: np.ndarray) -> np.ndarray:
     """Return (s, springs) degC of an array as declared, given currents (s, springs) and fan (s,) each second."""
+    return _temperatures_of(_declared(array), drive, fan)
+
+
+def _declared(array: Array) -> native.Plant:
     plant = native.Plant(array.rows, array.cols)
     plant.set_all(array_parameters(array))
     plant.set_effects(["latent_heat", "resistance_phase"])
-    return _temperatures_of(plant, drive, fan)
+    return plant
 
 
 def _temperatures_of(plant: native.Plant, drive: np.ndarray, fan: np.ndarray | None = None) -> np.ndarray:
