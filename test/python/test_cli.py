@@ -163,7 +163,7 @@ def test_fit_takes_the_effects_that_a_diagnosis_named_by_v_over_i(make_log, tmp_
     steady = make_log("steady.csv", effects={"latent_heat": {}})
     done = ninespring("fit", "--effects", "latent_heat,resistance_phase", steady, "-o", model)
     assert done.returncode == 2
-    assert f"{steady}: resistance_phase cannot show here: neither a temperature nor v / i depends on it" in done.stderr
+    assert f"{steady}: resistance_phase cannot show here: no temperature depends on it, and v / i" in done.stderr
 
 
 def test_the_chip_starts_again_after_gaps_and_is_seen_by_the_same_sensors(make_log) -> None:

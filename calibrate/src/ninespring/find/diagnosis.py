@@ -843,5 +843,7 @@ def by_resistance(problem: Problem, fit: Fit, wanted: Sequence[str]) -> resistan
 
 def _cannot_show(effect: str, runs: Sequence[Run]) -> InputError:
     more = f", nor in {len(runs) - 1} more" if len(runs) > 1 else ""
-    seen = "neither a temperature nor v / i" if effect in resistance.OF_THE_WIRE else "nothing in it"
-    return InputError(f"{effect} cannot show here{more}: {seen} depends on it", runs[0].name)
+    seen = "nothing in it depends on it"
+    if effect in resistance.OF_THE_WIRE:
+        seen = "no temperature depends on it, and v / i tells it of springs that stay in each phase for half a minute"
+    return InputError(f"{effect} cannot show here{more}: {seen}", runs[0].name)
