@@ -74,6 +74,18 @@ def test_without_a_thermometer_thin_wire_that_never_transforms_is_refused_and_pl
     assert plan.make_plan(thin, 1800.0, 1.5, 14.0, 105.0, board_alone=True).share_on.min() > 0.2
 
 
+def test_a_plan_tells_the_board_what_resistance_other_springs_have() -> None:
+    thin = Array(1, 2, spring={"wire_diameter_mm": 0.4})
+    told = [step for step in plan.make_plan(thin, 900.0, 0.8, 14.0, 105.0).steps if step.startswith("$resistance_")]
+    assert [one[12:] for one in told] == [
+        "maximum_ohm=1.999",
+        "minimum_ohm=0.320",
+        "martensite_ohm=0.700",
+        "austenite_ohm=0.875",
+    ]
+    assert not any("resistance" in step for step in plan.make_plan(Array(1, 2), 900.0, 0.8, 14.0, 105.0).steps)
+
+
 def test_what_was_planned_identifies_the_array(tmp_path: Path) -> None:
     made = plan.make_plan(Array(), 900.0, 2.0, 14.0, 105.0)
     current, fan = driven(script_lines("\n".join(made.steps), "steps.txt"), 9, 900, 2.0)

@@ -18,7 +18,7 @@ from ..export.settings import CROSSED, best_plant
 from ..io import ranges, results
 from ..model import native
 from ..model.models import Array, Model
-from ..model.simulate import array_parameters
+from ..model.simulate import RESISTANCES, array_parameters, board_settings
 
 LEVELS = (100, 100, 75, 50)
 """Percent of the current; full level half of the time, for only that transforms."""
@@ -113,7 +113,7 @@ def make_plan(
             f"ends at {finish_c:g}: another current (of thin wire less), or a hotter limit than {hottest_c:g}"
         )
     return Plan(
-        steps=_lines(array.springs, stretches, duration_s, current_a, resting, fan),
+        steps=whole_springs(array) + _lines(array.springs, stretches, duration_s, current_a, resting, fan),
         hottest_c=float(temperature.max()),
         most_a=float(drive.sum(axis=1).max()),
         share_on=(drive > 1.01 * resting / 100.0 * current_a).mean(axis=0),
@@ -145,7 +145,7 @@ def plan_experiment(
             raise InputError(f"this experiment gets hotter than {hottest_c:g} degC with any current")
         full_a *= BACK_OFF
         temperature = _temperatures(array, percent[at] / 100.0 * full_a, fan)
-    lines = ["policy open", f"$open_current_a={full_a:.3f}", "off all", "fan 0"]
+    lines = [*whole_springs(array), "policy open", f"$open_current_a={full_a:.3f}", "off all", "fan 0"]
     before, blows = np.zeros(array.springs), 0
     for one in steps:
         stamp = f"at {one.at_s + FIRST_S:g} = "
@@ -253,6 +253,16 @@ def _declared(array: Array) -> native.Plant:
     plant.set_all(array_parameters(array))
     plant.set_effects(["latent_heat", "resistance_phase"])
     return plant
+
+
+def whole_springs(array: Array) -> list[str]:
+    """Return the lines that tell a board which resistance springs have, where it is another than the paper's.
+
+    A board that takes them for the paper's gives them less current, and calls them a bad contact or a short.
+    """
+    if limits := board_settings(array):
+        limits |= {name: value for name, value in array_parameters(array).items() if name in RESISTANCES}
+    return [f"${name}={value:.3f}" for name, value in limits.items()]
 
 
 def _temperatures_of(plant: native.Plant, drive: np.ndarray, fan: np.ndarray | None = None) -> np.ndarray:

@@ -38,6 +38,7 @@ RUNS = ("run1", "run2")
 DIAGNOSIS = "diagnosis"
 SETTINGS, OLD_SETTINGS = "settings.txt", "settings-before.txt"
 OWN = ("policy", "open_current_a", "host_timeout_s", "telemetry_format", "telemetry_hz")
+OWN += tuple(f"resistance_{one}_ohm" for one in ("maximum", "minimum", "martensite", "austenite"))
 """Settings that recording changes, and that are given back."""
 COOLED_K, COOLED_S = 2.0, 60.0
 """A spring that falls by less than so much in so long is within 1 K of where it is going: that is more than a time constant (50 s)."""
