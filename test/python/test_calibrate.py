@@ -290,6 +290,17 @@ def test_settings_are_saved_if_the_board_drives_no_worse_with_them_and_taken_bac
     assert says in again.run() and not again.asked
 
 
+def test_nothing_that_is_held_excuses_a_spring_above_what_is_safe(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cold = measured(held=0.0, hottest_c=60.0)
+    told = until_export(tmp_path, [cold, measured(hottest_c=120.5), measured(hottest_c=120.5)], monkeypatch)
+    assert "reaches 60 degC as the chip is now, 120 with" in told.run() and "$save" not in told.fake.sent()
+    (warm := tmp_path / "warm").mkdir()
+    told = until_export(warm, [cold, measured(hottest_c=119.5)], monkeypatch)
+    assert told.run() == "" and "$save" in told.fake.sent()
+
+
 def test_of_springs_that_a_fault_kept_cold_no_error_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told = until_export(tmp_path, [measured()], monkeypatch)
     cold = asdict(measured(held=0.0, error_c=0.8))

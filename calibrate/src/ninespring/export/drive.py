@@ -21,6 +21,8 @@ TRANSFORMED = 0.9
 ENOUGH_K = 12.0
 """Above its austenite finish, what a spring may reach without being called hotter: the margin that the chip keeps above its
 own target while it is unsure (`unsure_margin_k`)."""
+SAFE_C = 120.0
+"""What no spring may pass (docs/safety.md), whatever it holds by that."""
 
 
 @dataclass(frozen=True)
@@ -103,10 +105,14 @@ def worse_than(old: Drive, new: Drive) -> list[str]:
     """Return the measures in which one drive is worse than another.
 
     A spring that is heated further takes longer and gets hotter: that is no fault of settings that hold more of it, and heating
-    later none of those with which the springs do no less in all. Nor is it one to heat a spring through that was not quite.
+    later none of those with which the springs do no less in all. Nor is it one to heat a spring through that was not quite; but
+    nothing excuses what passes SAFE_C.
     """
     out = []
-    excused = {"hottest_c": new.held - old.held > WORSE["held"].limit, "heating_s": new.done >= old.done}
+    excused = {
+        "hottest_c": new.held - old.held > WORSE["held"].limit and new.hottest_c <= SAFE_C,
+        "heating_s": new.done >= old.done,
+    }
     for measure, one in WORSE.items():
         a, b = getattr(old, measure), getattr(new, measure)
         if measure == "hottest_c":
