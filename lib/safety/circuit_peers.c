@@ -3,6 +3,8 @@
 #include <math.h>
 #include <stddef.h>
 
+#include "fixed_point.h"
+
 #define SHARE_Q7   128.0f
 #define SHARE_MOST 255.0f /* of 8 bits: what is shown, too */
 #define OWN_Q12    4096.0f
@@ -119,10 +121,19 @@ static bool are_alike(uint8_t a, uint8_t b)
     return 8u * a >= 7u * b && 8u * b >= 7u * a;
 }
 
+/* In the window before, of the supply. */
+static uint8_t shown_before_q7(const circuit_peer_t *before)
+{
+    const uint32_t share_q19 = fixed_point_mac_u16(0, before->share_q7, before->own_q12);
+    const uint32_t share_q7 = before->own_q12 == 0 ? before->share_q7 : share_q19 >> 12;
+    return share_q7 < 255u ? (uint8_t)(share_q7 | (share_q7 == 0)) : 255u;
+}
+
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
                          const circuit_window_t *window, const circuit_source_t *source)
 {
     circuit_peer_t *own = &peers->spring[k];
+    const circuit_peer_t before = *own;
     if (!circuit_window_compares(window)) {
         own->share_q7 = 0;
         return own->odd >= CIRCUIT_PEERS_WINDOWS;
@@ -138,6 +149,7 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     const float offsets_mv = OFFSETS_MV + (alike ? DROP_PART_ALIKE : DROP_PART) * source->drop_mv;
     bool good = true; /* nothing needs what is not known of the drop to explain it */
     bool odd = false;
+    bool only_offsets = false; /* explain it, where it is not odd */
     const uint8_t others_q7 = other != NULL ? other->share_q7 : 0;
     if (others_q7 != 0) {
         const float others = (float)others_q7 / SHARE_Q7;
@@ -162,15 +174,23 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     } else if (own->was_q7 != 0) {
         const float was = (float)own->was_q7 / SHARE_Q7;
         const float part = own->odd >= CIRCUIT_PEERS_WINDOWS - 1u ? KNOWN_PART : ALONE_PART;
-        const float off_mv = beyond(share, was, part) * expected_mv - offsets_mv;
+        const float off = beyond(share, was, part);
+        const float off_mv = off * expected_mv - offsets_mv;
+        only_offsets = off > 0.0f;
         good = off_mv <= (was_found(own) ? -offsets_mv : 0.0f);
         odd = off_mv > drop_mv(source, share < was, expected_mv, was_mv);
     }
     if (odd) {
         own->odd = own->odd < CIRCUIT_PEERS_WINDOWS ? (own->odd + 1u) & 3u : own->odd;
     } else if (good || !was_found(own)) {
-        if (window->balances) { /* what an open spring shows is no share of the supply */
-            own->was_q7 = to_q7(share);
+        /* what an open spring shows is no share of the supply */
+        if (window->balances && !only_offsets) {
+            if (before.was_q7 == 0) {
+                own->was_q7 = to_q7(share);
+            } else if (before.share_q7 != 0 && before.odd == 0 &&
+                       are_alike(before.shown_16mv, own->shown_16mv)) {
+                own->was_q7 = shown_before_q7(&before); /* in this one another may begin */
+            }
         }
         own->odd = 0;
         own->agreed = 1;

@@ -34,7 +34,7 @@ typedef struct {
     uint16_t agreed : 1;   /* a window that was not odd, since the last clear */
     uint8_t share_q7;      /* of the last window, over its own share; 0: it told nothing */
     uint8_t shown_16mv;    /* the voltage that should have been there then */
-    uint8_t was_q7;        /* of the last one that was not odd; 0: none was */
+    uint8_t was_q7;        /* of one before the last, that was not odd; 0: none was */
     uint8_t learnt;        /* windows that its own share is the mean of; at its most it stays */
 } circuit_peer_t;
 
@@ -49,13 +49,15 @@ typedef struct {
  * the voltages at which the two were read and its own share was learnt. As long as its own share is
  * not known, by 18 % (its wiring, its gains); where fewer than CIRCUIT_PEERS_LEAST others are
  * driven, from what it showed before by 20 % (its supply may move), but by 5 % once it was found
- * and cleared. What is not known of the drop teaches no share as far as volts differ, more where
- * less of them is found, and is let pass, and acquits nobody
- * who was found; nor does a window that only offsets explain. Its own share is the mean, by volts,
- * of the first 255 windows that are not odd and in which offsets make less than those 18 %, and
- * stays: so a drift is found, however slow. The others count each over its own share: a set that
- * changes moves nothing. A window that tells nothing, or of less than 0.1 V, is no witness for the
- * others, and changes nothing else. springs at most CIRCUIT_PEERS_MAX, spring below springs. */
+ * and cleared; that is the window before the last at about the same volts, as in the last one
+ * another share may begin, and none that is off by more than those 20 %, though offsets may be
+ * that. What is not known of the drop teaches no share as far as volts differ, more where less of
+ * them is found, and is let pass, and acquits nobody who was found; nor does a window that only
+ * offsets explain. Its own share is the mean, by volts, of the first 255 windows that are not odd
+ * and in which offsets make less than those 18 %, and stays: so a drift is found, however slow. The
+ * others count each over its own share: a set that changes moves nothing. A window that tells
+ * nothing, or of less than 0.1 V, is no witness for the others, and changes nothing else. springs
+ * at most CIRCUIT_PEERS_MAX, spring below springs. */
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t spring,
                          const circuit_window_t *window, const circuit_source_t *source);
 

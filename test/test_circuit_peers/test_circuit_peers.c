@@ -130,6 +130,27 @@ TEST(what_is_no_share_of_a_supply_is_not_what_it_showed_before)
     }
 }
 
+/* A supply of 8 V instead of 5, or another shunt, begins within a window: what that shows is of
+ * both. It is 5 V again, and cleared. */
+TEST(the_window_in_which_another_share_begins_is_not_what_it_showed_before)
+{
+    TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, HEATS_MV, 1.0f, 0.0f));
+    TEST_ASSERT_EQUAL_HEX(0, rounds(1, 1, HEATS_MV, 1.15f, 0.0f));
+    TEST_ASSERT_EQUAL_HEX(1, rounds(3, 1, HEATS_MV, 1.6f, 0.0f));
+    circuit_peers_clear(&peers, 0, true);
+    TEST_ASSERT_EQUAL_HEX(0, rounds(10, 1, HEATS_MV, 1.0f, 0.0f));
+    TEST_ASSERT_EQUAL_HEX(0, rounds(10, 1, HEATS_MV, 1.15f, 0.0f)); /* one that stays is */
+    TEST_ASSERT_EQUAL_HEX(0, rounds(10, 1, HEATS_MV, 1.3f, 0.0f));
+}
+
+/* Of 110 mV 25 are a quarter. */
+TEST(what_only_offsets_explain_is_not_what_it_showed_before)
+{
+    TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, HEATS_MV, 1.0f, 0.0f));
+    TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, 110.0f, 1.33f, 0.0f));
+    TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, HEATS_MV, 1.0f, 0.0f));
+}
+
 /* However slow: what is soldered stays what it is, and its share is no more learnt after 255
  * windows.
  */
