@@ -308,11 +308,15 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     spring_belief_t *b = &e->spring[k];
     const spring_learnt_t *l = &b->learnt;
     const bool told = b->told && b->possible == SPRING_PHASE_MARTENSITE;
-    if ((b->possible != SPRING_PHASE_ANY && !told) || l->austenite_ohm == 0.0f ||
-        b->current_a < STRONG_A || b->fresh < LOOK_TURNS) {
+    if ((b->possible != SPRING_PHASE_ANY && !told) || b->current_a < STRONG_A ||
+        b->fresh < LOOK_TURNS) {
         return;
     }
-    b->told = false;
+    b->told =
+        false; /* whether or not anything is known that could tell: it is heated from here on */
+    if (l->austenite_ohm == 0.0f) {
+        return;
+    }
     const float unsure = LOOK_SD + SPRING_ESTIMATOR_BOUND_SDS * b->noise / fabsf(l->change);
     if (unsure > LOOK_MOST) {
         return;

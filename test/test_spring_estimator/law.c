@@ -333,6 +333,26 @@ TEST(hottest_possible_cools_by_the_least_loss_with_its_latent_heat)
     TEST_ASSERT_EQUAL_FLOAT(0.0f, spring_estimator_cooling_s(&estimator, &model, 0));
 }
 
+/* `model cold` is of the heating that comes next: as long as nothing is learnt that could tell, its
+ * reading ends it all the same. Later martensite that reads like austenite is none. */
+TEST(a_hint_ends_as_the_spring_is_read_though_nothing_could_tell_yet)
+{
+    for (unsigned strong = 0; strong < 2; strong++) {
+        begin_cold();
+        row(strong);
+        put(30.0);
+        INSIDE.possible = M;
+        INSIDE.told = true;
+        INSIDE.fresh = 9;
+        INSIDE.current_a = strong != 0 ? 0.8f : 0.79f;
+        INSIDE.learnt.austenite_ohm = 0.0f;
+        give((double)INSIDE.current_a, 0.175);
+        turn();
+        TEST_ASSERT_EQUAL(strong == 0, INSIDE.told);
+        TEST_ASSERT_EQUAL_UINT8(M, INSIDE.possible);
+    }
+}
+
 /* Where it is told that, it is as the model has it. */
 TEST(what_is_told_is_the_models_phase)
 {
