@@ -173,6 +173,8 @@ float spring_take_readings(spring_estimator_t *estimator, const thermal_model_t 
 bool spring_is_loose(const spring_belief_t *belief);
 /* All that readings are compared with jumps along: a contact, or the sensor. */
 void spring_jump(spring_belief_t *belief, float by);
+/* Of its own martensite at its temperature; 0: not known. */
+float spring_martensite_ohm(const spring_belief_t *belief, const thermal_model_t *model, uint8_t k);
 /* So they do, by `by` of what it read (below 0: less), where no phase can have: it counts as a
  * jump. */
 void spring_misread(spring_estimator_t *estimator, const thermal_model_t *model, uint8_t spring,

@@ -16,6 +16,9 @@
  * coefficient in print over 68 K: 0.81 to 1.53. */
 #define UNLIKE_LEAST 0.75f
 #define UNLIKE_MOST  1.6f
+/* Of its own martensite's: more than a coefficient that is off by half of the largest one makes of
+ * 68 K. */
+#define ANOTHER_CIRCUIT 0.05f
 
 void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
 {
@@ -192,6 +195,22 @@ bool spring_estimator_lacks_contact(const spring_estimator_t *e, const thermal_m
            behind_contact_ohm(model, k, ohm) < UNLIKE_LEAST * e->martensite_ohm;
 }
 
+/* It is martensite again, and reads what none of its own does: a contact has moved while it was
+ * off, or what was read of it last was no spring's, as its sensor lied then. */
+static void take_another_circuit(spring_estimator_t *e, spring_belief_t *b,
+                                 const thermal_model_t *model, uint8_t k)
+{
+    const float own_ohm = spring_martensite_ohm(b, model, k);
+    const float step_ohm = b->ohm - own_ohm;
+    if (b->told || own_ohm <= 0.0f || fabsf(step_ohm) <= ANOTHER_CIRCUIT * own_ohm) {
+        return;
+    }
+    const spring_before_t before = spring_before(b, model, k);
+    spring_jump(b, b->ohm / own_ohm);
+    spring_note(e, model, k, SPRING_SIGHT_JUMPED, &before, 0.0f, 0.0f);
+    spring_note_read(e, k, step_ohm / own_ohm, b->noise);
+}
+
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is
  * a transformation, whatever its sign. */
 void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
@@ -208,6 +227,7 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         return;
     }
     if (b->possible == SPRING_PHASE_MARTENSITE && b->run.heat.cold_ohm == 0.0f) {
+        take_another_circuit(e, b, model, k);
         b->run.heat.cold_ohm = b->ohm;
         b->run.heat.cold_c = spring_now_c(model, k);
         const float own_ohm = behind_contact_ohm(model, k, b->ohm);

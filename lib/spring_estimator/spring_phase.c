@@ -22,7 +22,7 @@ static phase_source_t phase_source(const spring_belief_t *b)
 }
 
 /* Its own martensite's, at its temperature. */
-static float martensite_ohm_now(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
+float spring_martensite_ohm(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
     return l->martensite_ohm *
@@ -46,7 +46,7 @@ float spring_estimator_phase(const spring_estimator_t *e, const thermal_model_t 
     case BY_RESISTANCE:
         return phase_by_resistance(b);
     case BY_MARTENSITE:
-        return spring_clamp((1.0f - martensite_ohm_now(b, model, k) / b->phase_ohm) / l->change,
+        return spring_clamp((1.0f - spring_martensite_ohm(b, model, k) / b->phase_ohm) / l->change,
                             0.0f, 1.0f);
     case BY_MODEL:
         break;

@@ -517,6 +517,33 @@ TEST(what_still_transforms_is_no_hotter_than_that_lets_it_be)
     }
 }
 
+/* A sensor showed 0.8 of its voltage until it was switched off: what was learnt went along, as by a
+ * contact. It is exchanged; martensite reads 25 % more than its own, and that is no phase. */
+TEST(martensite_that_reads_otherwise_than_its_own_is_of_another_circuit)
+{
+    static const struct {
+        uint8_t possible;
+        bool told;
+        double was_ohm, ohm, by;
+    } table[] = {{M, false, 0.140, 0.175, 1.25}, {M, false, 0.175, 0.140, 0.8},
+                 {M, false, 0.175, 0.183, 1.0},  {M, false, 0.175, 0.185, 0.185 / 0.175},
+                 {M, false, 0.0, 0.175, 1.0},    {M, true, 0.140, 0.175, 1.0},
+                 {B, false, 0.140, 0.175, 1.0}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_heating_at(30.0, table[n].possible, 5.0);
+        row(n);
+        INSIDE.told = table[n].told;
+        INSIDE.ohm = (float)table[n].ohm;
+        INSIDE.learnt.martensite_ohm = (float)table[n].was_ohm;
+        INSIDE.learnt.martensite_rise_per_k = 0.0f;
+        INSIDE.learnt.austenite_ohm = 0.2f;
+        spring_heating_watch(&estimator, &INSIDE, &model, 0);
+        NEAR(table[n].by * table[n].was_ohm, INSIDE.learnt.martensite_ohm);
+        NEAR(table[n].by * 0.2, INSIDE.learnt.austenite_ohm);
+        TEST_ASSERT_EQUAL(table[n].by != 1.0, sight()->kind == SPRING_SIGHT_JUMPED);
+    }
+}
+
 /* Cold martensite of 0.75 to 1.6 of the declared resistance is this circuit's, behind the contact
  * that is declared. */
 TEST(cold_martensite_is_compared_with_the_declared_one)
