@@ -151,6 +151,18 @@ TEST(what_only_offsets_explain_is_not_what_it_showed_before)
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, HEATS_MV, 1.0f, 0.0f));
 }
 
+/* A selftest of 0.3 A with half of a shunt, which is then exchanged: it had no fault, so a clear
+ * forgets nothing. */
+TEST(of_too_few_volts_nothing_is_what_it_showed_before)
+{
+    TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, 110.0f, 0.75f, 0.0f));
+    TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, HEATS_MV, 1.0f, 0.0f));
+    TEST_ASSERT_EQUAL_HEX(1, rounds(3, 1, HEATS_MV, 0.75f, 0.0f)); /* from here on it is */
+    setUp();
+    TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, 130.0f, 0.75f, 0.0f));
+    TEST_ASSERT_EQUAL_HEX(1, rounds(3, 1, HEATS_MV, 1.0f, 0.0f));
+}
+
 /* However slow: what is soldered stays what it is, and its share is no more learnt after 255
  * windows.
  */
