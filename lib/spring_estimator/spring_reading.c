@@ -4,11 +4,13 @@
 
 #define LEAST_READINGS 4
 #define LEAST_MEAN_MA  50u
-#define SETTLING_TICKS 8
-#define NOISE_MOST     0.05f
-#define NOISE_SHARE    0.06f
-#define BEND_TO_SD     0.512f /* mean size of a second difference: 1 / (sqrt(6) sqrt(2 / pi)) */
-#define SAME_CURRENT   0.1f /* currents that differ by less of them show a sensor's offset alike */
+/* 0.02 ohm: no spring, but a sensor's offset in one that gets nothing, or a short */
+#define LEAST_MA_PER_MV 50u
+#define SETTLING_TICKS  8
+#define NOISE_MOST      0.05f
+#define NOISE_SHARE     0.06f
+#define BEND_TO_SD      0.512f /* mean size of a second difference: 1 / (sqrt(6) sqrt(2 / pi)) */
+#define SAME_CURRENT    0.1f /* currents that differ by less of them show a sensor's offset alike */
 /* Of a resistance in a turn. */
 #define JUMP_OF_HOLD 0.01f /* 0.4 W change 1 % of the phase, 0.3 % of it */
 #define JUMP_OF_LOAD 0.08f /* 16 K at once, latent heat kept: 40 % of the phase */
@@ -140,7 +142,7 @@ float spring_take_readings(spring_estimator_t *e, const thermal_model_t *model, 
         b->ohm_before[1] = 0.0f;
     }
     b->reads = b->readings >= LEAST_READINGS && b->current_sum_ma >= LEAST_MEAN_MA * b->readings &&
-               b->voltage_sum_mv > 0;
+               (uint32_t)b->voltage_sum_mv * LEAST_MA_PER_MV > b->current_sum_ma;
     if (b->reads) {
         const float offset_mv = 1e3f * b->learnt.offset_v * (float)b->readings;
         const float ohm = ((float)b->voltage_sum_mv - offset_mv) / (float)b->current_sum_ma;

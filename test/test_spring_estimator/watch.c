@@ -33,8 +33,8 @@ static void give(double current_a, double ohm)
 
 /* ---- readings ---- */
 
-/* Four of 50 mA and of any voltage make one, less the sensor's offset; without current it begins
- * anew. */
+/* Four of 50 mA and of a voltage that a spring has make one, less the sensor's offset; without
+ * current it begins anew. */
 TEST(reading_is_the_mean_of_enough_of_them)
 {
     static const struct {
@@ -98,6 +98,26 @@ TEST(readings_that_no_sensor_gives_are_left_out)
             TEST_ASSERT_EQUAL_UINT16(taken * (unsigned)table[n].ma, INSIDE.current_sum_ma);
             TEST_ASSERT_EQUAL_UINT16(taken * (unsigned)table[n].mv, INSIDE.voltage_sum_mv);
         }
+    }
+}
+
+/* A sensor that shows 0.3 A in a spring that gets nothing, or a short: 4 mV, a step of its
+ * register, are no resistance, and no noise of one. */
+TEST(what_no_spring_reads_is_no_resistance)
+{
+    for (unsigned reads = 0; reads < 2; reads++) {
+        begin_cold();
+        row(reads);
+        INSIDE.fresh = 9;
+        INSIDE.ohm = INSIDE.slow_ohm = INSIDE.ohm_before[0] = INSIDE.ohm_before[1] = 0.22f;
+        INSIDE.current_a = 0.3f;
+        INSIDE.readings = 8;
+        INSIDE.current_sum_ma = 8 * 300;
+        INSIDE.voltage_sum_mv = reads != 0 ? 8 * 7 : 8 * 6;
+        (void)spring_take_readings(&estimator, &model, 0);
+        TEST_ASSERT_EQUAL(reads != 0, INSIDE.reads);
+        TEST_ASSERT_EQUAL(reads == 0, INSIDE.noise < 0.003f);
+        NEAR(reads != 0 ? 7.0 / 300.0 : 0.22, INSIDE.ohm);
     }
 }
 
