@@ -183,8 +183,7 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     if (odd) {
         own->odd = own->odd < CIRCUIT_PEERS_WINDOWS ? (own->odd + 1u) & 3u : own->odd;
     } else if (good || !was_found(own)) {
-        /* what an open spring shows is no share of the supply, nor what offsets may be as much of
-         */
+        /* what an open spring shows is no share of the supply, nor what may be offsets' */
         if (window->balances && !only_offsets && offsets_mv <= ALONE_PART * expected_mv) {
             if (before.was_q7 == 0) {
                 own->was_q7 = to_q7(share);

@@ -312,8 +312,7 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
         b->fresh < LOOK_TURNS) {
         return;
     }
-    b->told =
-        false; /* whether or not anything is known that could tell: it is heated from here on */
+    b->told = false; /* it is heated from here on: of a later look nobody has said anything */
     if (l->austenite_ohm == 0.0f) {
         return;
     }
