@@ -129,6 +129,18 @@ static uint8_t shown_before_q7(const circuit_peer_t *before)
     return share_q7 < 255u ? (uint8_t)(share_q7 | (share_q7 == 0)) : 255u;
 }
 
+/* What it showed, to be compared with: of the window before, at about the same volts, as in this
+ * one another circuit may begin. */
+static void keep(circuit_peer_t *own, const circuit_peer_t *before, float share)
+{
+    if (before->was_q7 == 0) {
+        own->was_q7 = to_q7(share);
+    } else if (before->share_q7 != 0 && before->odd == 0 &&
+               are_alike(before->shown_16mv, own->shown_16mv)) {
+        own->was_q7 = shown_before_q7(before);
+    }
+}
+
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
                          const circuit_window_t *window, const circuit_source_t *source)
 {
@@ -185,12 +197,7 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     } else if (good || !was_found(own)) {
         /* what an open spring shows is no share of the supply, nor what may be offsets' */
         if (window->balances && !only_offsets && offsets_mv <= ALONE_PART * expected_mv) {
-            if (before.was_q7 == 0) {
-                own->was_q7 = to_q7(share);
-            } else if (before.share_q7 != 0 && before.odd == 0 &&
-                       are_alike(before.shown_16mv, own->shown_16mv)) {
-                own->was_q7 = shown_before_q7(&before); /* in this one another may begin */
-            }
+            keep(own, &before, share);
         }
         own->odd = 0;
         own->agreed = 1;
