@@ -149,6 +149,10 @@ TEST(what_only_offsets_explain_is_not_what_it_showed_before)
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, HEATS_MV, 1.0f, 0.0f));
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, 110.0f, 1.33f, 0.0f));
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, HEATS_MV, 1.0f, 0.0f));
+    setUp(); /* a lie that begins at 150 mV is found at more of them */
+    TEST_ASSERT_EQUAL_HEX(0, rounds(3, 1, 150.0f, 1.0f, 0.0f));
+    TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, 150.0f, 0.7f, 0.0f));
+    TEST_ASSERT_EQUAL_HEX(1, rounds(3, 1, HEATS_MV, 0.7f, 0.0f));
 }
 
 /* A selftest of 0.3 A with half of a shunt, which is then exchanged: it had no fault, so a clear
