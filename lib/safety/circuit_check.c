@@ -168,15 +168,15 @@ bool circuit_check_judge(circuit_check_t *c, const circuit_source_t *source, uin
         const float square_mv2 = share * (float)c->voltage_square;
         restless = moves_alone(square_mv2 - found_mv * found_mv, follows_mv, variance, found_mv);
         if (window != NULL) {
-            *window = (circuit_window_t){
-                .found_mv = found_mv,
-                .expected_mv = expected_mv,
-                .share = expected_mv >= CIRCUIT_WINDOW_LEAST_MV ? found_mv / expected_mv : 0.0f,
-                .current_ma = 2.0f * share * (float)c->current_2ma,
-                .duty = duty,
-                .steady = variance < STEADY_SHARE * STEADY_SHARE * duty * duty,
-                .tells = true,
-                .balances = beyond_mv <= 0.0f};
+            *window =
+                (circuit_window_t){.found_mv = found_mv,
+                                   .expected_mv = expected_mv,
+                                   .share = circuit_window_share(found_mv, expected_mv),
+                                   .current_ma = 2.0f * share * (float)c->current_2ma,
+                                   .duty = duty,
+                                   .steady = variance < STEADY_SHARE * STEADY_SHARE * duty * duty,
+                                   .tells = true,
+                                   .balances = beyond_mv <= 0.0f};
         }
     }
     c->astray = counted(c->astray, astray) & 15u;

@@ -54,13 +54,19 @@ static inline bool circuit_check_is_sound(const circuit_check_t *check)
 typedef struct {
     float found_mv;    /* behind the switch */
     float expected_mv; /* by duty, supply and drop */
-    float share;       /* what was found of it; 0: too little is expected to tell */
+    float share;       /* circuit_window_share of them */
     float current_ma;
     bool tells;    /* there were readings enough */
     bool steady;   /* all at about the same duty */
     float duty;    /* steps of 800 */
     bool balances; /* its duty brings what was found, with no help of a drop that is not known */
 } circuit_window_t;
+
+/* What was found of a voltage that should be there; 0: that is too little to tell. */
+static inline float circuit_window_share(float found_mv, float expected_mv)
+{
+    return expected_mv >= CIRCUIT_WINDOW_LEAST_MV ? found_mv / expected_mv : 0.0f;
+}
 
 /* It tells what a spring's circuit shows of the voltage that its duty should bring. */
 static inline bool circuit_window_compares(const circuit_window_t *window)

@@ -28,9 +28,7 @@ void main(void)
             .tells = any_bool(),
             .balances = any_bool(),
         };
-        if (window.expected_mv >= CIRCUIT_WINDOW_LEAST_MV) {
-            window.share = window.found_mv / window.expected_mv;
-        }
+        window.share = circuit_window_share(window.found_mv, window.expected_mv);
         const uint8_t springs = (uint8_t)any_between(1, CIRCUIT_PEERS_MAX);
         const uint8_t spring = (uint8_t)any_between(0, springs - 1);
         (void)circuit_peers_judge(&peers, springs, spring, &window, &source);

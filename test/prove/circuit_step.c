@@ -23,9 +23,7 @@ void main(void)
             .tells = any_bool(),
             .steady = any_bool(),
         };
-        if (window.expected_mv >= CIRCUIT_WINDOW_LEAST_MV) {
-            window.share = window.found_mv / window.expected_mv;
-        }
+        window.share = circuit_window_share(window.found_mv, window.expected_mv);
         (void)circuit_step_judge(&step, &window, &source, &settings);
         if (any_bool()) {
             const circuit_source_t now = any_source();

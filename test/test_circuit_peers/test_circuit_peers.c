@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "../circuit_window.h"
 #include "../run_tests.h"
 #include "circuit_peers.h"
 
@@ -19,21 +20,9 @@ void setUp(void)
     source = (circuit_source_t){0};
 }
 
-/* A window that tells, at one duty. */
-static circuit_window_t window_of(float found_mv, float expected_mv)
-{
-    return (circuit_window_t){
-        .found_mv = found_mv,
-        .expected_mv = expected_mv,
-        .share = expected_mv >= CIRCUIT_WINDOW_LEAST_MV ? found_mv / expected_mv : 0.0f,
-        .tells = true,
-        .steady = true,
-        .balances = true};
-}
-
 static bool takes(uint8_t spring, float expected_mv, float share)
 {
-    const circuit_window_t window = window_of(share * expected_mv, expected_mv);
+    const circuit_window_t window = window_of(share * expected_mv, expected_mv, 0.0f);
     return circuit_peers_judge(&peers, SPRINGS, spring, &window, &source);
 }
 
@@ -119,7 +108,7 @@ TEST(what_is_no_share_of_a_supply_is_not_what_it_showed_before)
 {
     for (unsigned doubted = 0; doubted < 2; doubted++) {
         setUp();
-        circuit_window_t open = window_of(0.0f, HEATS_MV);
+        circuit_window_t open = window_of(0.0f, HEATS_MV, 0.0f);
         open.balances = false;
         for (unsigned n = 0; n < 4; n++) {
             TEST_ASSERT_FALSE(circuit_peers_judge(&peers, SPRINGS, 0, &open, &source));
@@ -468,7 +457,7 @@ TEST(the_middle_one_of_the_others_counts)
             }
         }
         (void)takes(4, HEATS_MV, 1.95f);
-        const circuit_window_t window = window_of((odd ? 0.79f : 0.80f) * HEATS_MV, HEATS_MV);
+        const circuit_window_t window = window_of((odd ? 0.79f : 0.80f) * HEATS_MV, HEATS_MV, 0.0f);
         for (unsigned times = 0; times < 3; times++) {
             const bool found = circuit_peers_judge(&peers, 4, asked, &window, &source);
             TEST_ASSERT_EQUAL(odd && times == 2, found);

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "../circuit_window.h"
 #include "../run_tests.h"
 #include "circuit_step.h"
 
@@ -25,19 +26,6 @@ typedef struct {
 } shown_t;
 
 static const shown_t honest = {0.9f, 0.219f, 0.18f, 1.0f, 1.0f, 1.0f, 0.0f, 0.0f};
-
-/* A window that tells, at one duty. */
-static circuit_window_t window_of(float found_mv, float expected_mv, float current_ma)
-{
-    return (circuit_window_t){
-        .found_mv = found_mv,
-        .expected_mv = expected_mv,
-        .share = expected_mv >= CIRCUIT_WINDOW_LEAST_MV ? found_mv / expected_mv : 0.0f,
-        .current_ma = current_ma,
-        .tells = true,
-        .steady = true,
-        .balances = true};
-}
 
 static bool takes(shown_t s)
 {
