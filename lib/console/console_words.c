@@ -255,6 +255,7 @@ static console_error_t word_clear(console_t *console, const arguments_t *argumen
 {
     (void)arguments;
     controller_clear_faults(console->controller);
+    console_start_job(console, CONSOLE_JOB_FAULTS); /* that stay */
     return CONSOLE_OK;
 }
 
@@ -367,7 +368,7 @@ static console_error_t word_echo(console_t *console, const arguments_t *argument
     X(learnt, 0, 1, NONE, word_learnt, " [clear]  each spring's own numbers; clear: forget them")  \
     X(why, 1, 1, NONE, word_why, " K  the last sights of a spring: read, believed, what was done") \
     X(faults, 0, 0, FAULTS, NULL, "  what is latched")                                             \
-    X(clear, 0, 0, NONE, word_clear, "  forget faults; all springs off")                           \
+    X(clear, 0, 0, NONE, word_clear, "  forget faults, say what stays; all springs off")           \
     X(unlock, 0, 0, NONE, word_unlock, "  after a watchdog or brown-out reset")                    \
     X(supply, 1, 1, NONE, word_supply, " on|off  of all stages, where a cut-off is fitted")        \
     X(selftest, 0, 0, NONE, word_selftest, "  each sensor, and each spring with 0.3 A")            \

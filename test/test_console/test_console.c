@@ -649,6 +649,9 @@ TEST(a_fault_that_a_clear_leaves_says_for_how_long)
         expect_said("spring 4: fault 15 sensor_mismatch");
         TEST_ASSERT_EQUAL(n != 0, strstr(said, "mismatch: clear again in 5") != NULL);
         expect_ok("clear");
+        TEST_ASSERT_EQUAL(n != 0,
+                          strstr(said, "spring 4: fault 15 sensor_mismatch: clear ") != NULL);
+        TEST_ASSERT_EQUAL(n == 0, strcmp(said, "ok\r\n") == 0);
     }
 }
 

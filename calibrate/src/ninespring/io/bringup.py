@@ -150,8 +150,7 @@ def clear(board: Board) -> None:
 
     A fault 11 or 15 of a spring that was cleared of one before stays until that has rested: the board says how long.
     """
-    board.ask("clear")
-    rests = [int(s) for one in board.ask("faults") for s in re.findall(r": clear again in (\d+) s$", one)]
+    rests = [int(s) for one in board.ask("clear") for s in re.findall(r": clear again in (\d+) s$", one)]
     if rests:
         rows(board, max(rests) + 1)  # it counts whole turns
         board.ask("clear")
