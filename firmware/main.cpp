@@ -48,11 +48,13 @@ static ambient_t ambient;
 static controller_inputs_t inputs;
 static controller_outputs_t outputs;
 
-// Over a warm reset: the heat that was given, and the model's state.
+// Over a warm reset: the heat that was given, the model's state, and whose sensor lies: it is found
+// by what it showed before, which is lost, and whoever opens a Mega's port resets it.
 typedef struct {
     temperature_ceiling_t delivered;
     thermal_model_state_t state;
-    bool known; // else the state is a guess: after the reset the board waits anew
+    uint16_t mismatched; // a bit a spring
+    bool known;          // else the state is a guess: after the reset the board waits anew
     uint16_t crc;
 } kept_t;
 static kept_t kept __attribute__((section(".noinit")));
@@ -137,6 +139,12 @@ static void keep_model(void)
     controller_get_delivered(&controller, &kept.delivered);
     controller_get_model_state(&controller, &kept.state);
     kept.known = controller_is_known(&controller);
+    kept.mismatched = 0;
+    for (uint8_t k = 0; k < controller_springs(&controller); k++) {
+        if (controller_fault(&controller, k) == SAFETY_FAULT_SENSOR_MISMATCH) {
+            kept.mismatched |= (uint16_t)(1u << k);
+        }
+    }
     kept.crc = crc_of_kept();
 }
 
@@ -153,6 +161,11 @@ static void start_model(uint8_t cause)
         (void)controller_set_model_state(&controller, &kept.state);
     }
     controller_set_delivered(&controller, &kept.delivered);
+    for (uint8_t k = 0; k < controller_springs(&controller); k++) {
+        if ((kept.mismatched & (uint16_t)(1u << k)) != 0) {
+            controller_mistrust(&controller, k);
+        }
+    }
 }
 
 // Settings, limits, or what is derived of them, are not what they were: a bit of RAM has turned

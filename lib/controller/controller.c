@@ -726,6 +726,12 @@ void controller_clear_faults(controller_t *controller)
     drive_policy_clear(&controller->policy);
 }
 
+void controller_mistrust(controller_t *controller, uint8_t spring)
+{
+    safety_trip(&controller->safety, spring, SAFETY_FAULT_SENSOR_MISMATCH);
+    controller->mistrusted[spring / 8u] |= bit_of(spring);
+}
+
 void controller_lock(controller_t *controller)
 {
     safety_lock(&controller->safety);

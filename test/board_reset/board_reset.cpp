@@ -233,6 +233,33 @@ TEST(a_reset_keeps_the_heat_that_was_given_before_anything_was_known)
     TEST_ASSERT_FALSE(contains(mega.say("model cold"), "was heated"));
 }
 
+/* Whoever opens a Mega's port resets it. What told of the lie, how its circuit showed before, is
+ * lost by that: the spring was heated again by the same readings, 122 degC and after three resets
+ * 152, and nothing was said. */
+TEST(who_resets_the_board_believes_no_sensor_that_was_found_to_lie)
+{
+    rig mega;
+    mega.boot_niti({"policy precompensate", "on 5"});
+    mega.run_ms(60e3);
+    board_scale_sensor(mega.raw(), 4, 0.6, 1.0);
+    mega.run_ms(2500.0);
+    TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_SENSOR_MISMATCH, mega.view().spring[4].fault);
+    for (int n = 0; n < 2; ++n) {
+        board_reset(mega.raw(), BOARD_RESET_EXTERNAL);
+        mega.boot(false);
+        mega.expect_says("faults", "spring 5: fault 15 sensor_mismatch: clear again in ");
+        mega.expect_ok("clear");
+        mega.expect_error("on 5", 11);
+    }
+    mega.expect_ok("on 1");
+    mega.run_ms(60e3);
+    mega.expect_ok("clear");
+    mega.expect_ok("on 5");
+    mega.run_ms(5e3);
+    TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_SENSOR_MISMATCH, mega.view().spring[4].fault);
+    TEST_ASSERT_TRUE(hottest_c(mega) < 110.0);
+}
+
 /* Nobody knows how long it was off: the springs may be as hot as they ever get. */
 TEST(after_power_on_a_spring_waits_until_it_cannot_be_hot)
 {
