@@ -213,7 +213,12 @@ static console_error_t begin_inputs(console_t *console, const arguments_t *argum
     if (console_any_spring_on(console)) {
         return CONSOLE_ERROR_SPRINGS_ON;
     }
-    const console_error_t error = may_drive(console);
+    console_error_t error = may_drive(console);
+    for (uint8_t k = 0; k < controller_springs(console->controller); k++) {
+        if (controller_fault(console->controller, k) != SAFETY_FAULT_NONE) {
+            error = CONSOLE_ERROR_FAULT; /* to begin anew would forget it, and what tells of it */
+        }
+    }
     if (error == CONSOLE_OK) {
         telemetry_set(console->telemetry, TELEMETRY_OFF, console->telemetry->hz);
         console_start_job(console, CONSOLE_JOB_INPUTS);

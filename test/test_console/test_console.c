@@ -254,6 +254,15 @@ TEST(what_else_is_refused_changes_nothing_either)
     expect_error("telemetry inputs", CONSOLE_ERROR_SPRINGS_ON);
 }
 
+/* A replay begins anew: a sensor that was found to lie would be believed, without a word. */
+TEST(no_replay_begins_by_forgetting_a_fault)
+{
+    safety_trip(&controller.safety, 4, SAFETY_FAULT_SENSOR_MISMATCH);
+    expect_error("telemetry inputs", CONSOLE_ERROR_FAULT);
+    expect_ok("faults");
+    expect_said("spring 5: fault 15 sensor_mismatch");
+}
+
 /* It would begin everything anew, without a word, and believe hot springs of before power-on. */
 TEST(another_size_is_refused_while_a_spring_is_driven)
 {
