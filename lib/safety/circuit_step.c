@@ -119,12 +119,14 @@ bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
         leave(step);
         return false;
     }
-    if (!window->steady) { /* of two currents */
-        step->again = 1;
-        return step->odd >= CIRCUIT_STEP_WINDOWS;
-    }
     const circuit_shown_t now = {to_q12(window->share), to_q12(spring_mv / window->current_ma),
                                  (uint8_t)fminf(window->current_ma / CURRENT_MA, 255.0f)};
+    if (!window->steady) { /* of two currents: like one where their mean is */
+        step->again = 1;
+        if (step->was[0].share_q12 == 0 || !is_like(now.current_16ma, step->was[0].current_16ma)) {
+            return step->odd >= CIRCUIT_STEP_WINDOWS;
+        }
+    }
     look_back(step, &now);
     circuit_shown_t *const was = &step->was[0];
     if (was->share_q12 == 0) {

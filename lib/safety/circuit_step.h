@@ -50,7 +50,8 @@ typedef struct {
  * At another current, or where a window tells nothing, is of less than 0.1 V or of less than 16 mA,
  * another window is kept, and this one beside it, if it was for 3 of them: a lie that has the
  * spring heated again is held against the hold before. There both must be off as such a lie moves
- * them, the share by 6 %: others may have begun since. A window of two currents is left out. */
+ * them, the share by 6 %: others may have begun since. A window of two currents is judged so, too,
+ * where their mean is as before; else it is left out. */
 bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
                         const circuit_source_t *source,
                         const current_control_parameters_t *circuit);

@@ -294,6 +294,20 @@ TEST(a_window_of_two_currents_is_left_out)
     }
 }
 
+/* A user who pulses a spring makes each window one of two currents: none of them was judged, and a
+ * sensor that showed 0.6 of its current had its spring, alone, at 135 degC. */
+TEST(a_lie_is_found_though_no_window_is_of_one_current)
+{
+    for (unsigned k = 0; k < 5; k++) {
+        TEST_ASSERT_FALSE(takes(honest));
+    }
+    for (unsigned n = 0; n < 2; n++) {
+        circuit_window_t pulsed = window_of(498.0f, 600.0f, 900.0f); /* shows 0.6 of 1.5 A */
+        pulsed.steady = false;
+        TEST_ASSERT_EQUAL(n == 1, circuit_step_judge(&step, &pulsed, &source, &circuit));
+    }
+}
+
 /* Both at once, as by chance: phase that is lost where others have begun at one end of a cable. */
 TEST(a_twentieth_of_the_supply_makes_no_lie_of_what_changed_meanwhile)
 {
