@@ -70,12 +70,13 @@ void spring_note_on(spring_estimator_t *e, const thermal_model_t *model, uint8_t
                     spring_sight_kind_t kind, const spring_before_t *before, float seen_c,
                     float sd_k)
 {
-    const spring_sight_t *const last = spring_sights_newest(&e->sights, k);
+    spring_sight_t *const last = spring_sights_newest(&e->sights, k);
     if (last == NULL || last->kind != kind || last->did != 0) {
         spring_note(e, model, k, kind, before, seen_c, sd_k);
         return;
     }
-    fill(e, model, k, spring_sights_renew(&e->sights, last), before, seen_c, sd_k);
+    spring_sights_renew(&e->sights, last);
+    fill(e, model, k, last, before, seen_c, sd_k);
 }
 
 void spring_note_read(spring_estimator_t *e, uint8_t k, float read, float sd)

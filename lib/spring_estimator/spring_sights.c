@@ -1,87 +1,104 @@
 #include "spring_sights.h"
 
 #include <stddef.h>
-#include <string.h>
+
+/* How many were noted since: their numbers come round. */
+static uint32_t since(const spring_sights_t *sights, const spring_sight_t *sight)
+{
+    return sights->numbers - sight->number;
+}
+
+static bool is_of(const spring_sight_t *sight, uint8_t spring)
+{
+    return spring == SPRING_SIGHTS_ANY || sight->spring == spring;
+}
+
+/* Of a spring, or of any; NULL where there is none. */
+static spring_sight_t *oldest(spring_sights_t *sights, uint8_t spring)
+{
+    spring_sight_t *found = NULL;
+    for (uint8_t i = 0; i < sights->count; i++) {
+        spring_sight_t *const sight = &sights->sight[i];
+        if (is_of(sight, spring) &&
+            (found == NULL || since(sights, sight) > since(sights, found))) {
+            found = sight;
+        }
+    }
+    return found;
+}
 
 void spring_sights_drop(spring_sights_t *sights, const spring_sight_t *sight)
 {
-    const uint8_t at = (uint8_t)(sight - sights->sight);
     sights->count--;
-    memmove(&sights->sight[at], &sights->sight[at + 1u],
-            (size_t)(sights->count - at) * sizeof(spring_sight_t));
+    sights->sight[sight - sights->sight] = sights->sight[sights->count];
 }
 
 void spring_sights_turn(spring_sights_t *sights)
 {
     sights->turn++;
-    if (sights->count != 0 &&
-        spring_sights_age_turns(sights, &sights->sight[0]) > SPRING_SIGHTS_TURNS) {
-        spring_sights_drop(sights, &sights->sight[0]);
+    const spring_sight_t *const first = oldest(sights, SPRING_SIGHTS_ANY);
+    if (first != NULL && spring_sights_age_turns(sights, first) > SPRING_SIGHTS_TURNS) {
+        spring_sights_drop(sights, first);
     }
 }
 
 /* The oldest of the spring that has most: one that has much to tell leaves the others theirs. One
  * that is of no spring, as a bit of it has turned over, is missed least. */
-static uint8_t least_missed(const spring_sights_t *sights)
+static spring_sight_t *least_missed(spring_sights_t *sights)
 {
     uint8_t of[THERMAL_MODEL_MAX_SPRINGS] = {0};
     uint8_t most = 0;
     for (uint8_t i = 0; i < sights->count; i++) {
-        if (sights->sight[i].spring >= THERMAL_MODEL_MAX_SPRINGS) {
-            return i;
+        const uint8_t spring = sights->sight[i].spring;
+        if (spring >= THERMAL_MODEL_MAX_SPRINGS) {
+            return &sights->sight[i];
         }
-        const uint8_t has = ++of[sights->sight[i].spring];
-        most = has > most ? has : most;
+        of[spring]++;
+        most = of[spring] > of[most] ? spring : most;
     }
-    uint8_t at = 0;
-    while (of[sights->sight[at].spring] != most) {
-        at++;
-    }
-    return at;
+    return oldest(sights, most);
 }
 
 spring_sight_t *spring_sights_add(spring_sights_t *sights, uint8_t spring)
 {
-    if (sights->count == SPRING_SIGHTS_KEPT) {
-        spring_sights_drop(sights, &sights->sight[least_missed(sights)]);
-    }
-    spring_sight_t *const sight = &sights->sight[sights->count++];
+    spring_sight_t *const sight = sights->count == SPRING_SIGHTS_KEPT
+                                      ? least_missed(sights)
+                                      : &sights->sight[sights->count++];
     *sight = (spring_sight_t){.turn = sights->turn, .number = sights->numbers++, .spring = spring};
     return sight;
 }
 
-spring_sight_t *spring_sights_renew(spring_sights_t *sights, const spring_sight_t *sight)
+void spring_sights_renew(spring_sights_t *sights, spring_sight_t *sight)
 {
-    const spring_sight_t goes_on = *sight;
-    spring_sights_drop(sights, sight);
-    spring_sight_t *const renewed = &sights->sight[sights->count++];
-    *renewed = goes_on;
-    renewed->turn = sights->turn;
-    renewed->number = sights->numbers++;
-    return renewed;
+    sight->turn = sights->turn;
+    sight->number = sights->numbers++;
 }
 
 spring_sight_t *spring_sights_newest(spring_sights_t *sights, uint8_t spring)
 {
-    for (uint8_t i = sights->count; i != 0; i--) {
-        if (sights->sight[i - 1u].spring == spring) {
-            return &sights->sight[i - 1u];
+    spring_sight_t *found = NULL;
+    for (uint8_t i = 0; i < sights->count; i++) {
+        spring_sight_t *const sight = &sights->sight[i];
+        if (sight->spring == spring &&
+            (found == NULL || since(sights, sight) < since(sights, found))) {
+            found = sight;
         }
     }
-    return NULL;
+    return found;
 }
 
 const spring_sight_t *spring_sights_from(const spring_sights_t *sights, uint8_t spring,
                                          uint32_t from)
 {
+    const spring_sight_t *found = NULL;
     for (uint8_t i = 0; i < sights->count; i++) {
         const spring_sight_t *const sight = &sights->sight[i];
-        if ((spring == SPRING_SIGHTS_ANY || sight->spring == spring) &&
-            sight->number - from <= INT32_MAX) {
-            return sight;
+        if (is_of(sight, spring) && sight->number - from <= INT32_MAX &&
+            (found == NULL || sight->number - from < found->number - from)) {
+            found = sight;
         }
     }
-    return NULL;
+    return found;
 }
 
 uint32_t spring_sights_first(const spring_sights_t *sights)

@@ -68,17 +68,17 @@ typedef struct {
     uint32_t numbers;                         /* the next record's */
     uint16_t turn;                            /* now */
     uint8_t count;                            /* of records */
-    spring_sight_t sight[SPRING_SIGHTS_KEPT]; /* oldest first */
+    spring_sight_t sight[SPRING_SIGHTS_KEPT]; /* in no order: their numbers tell it */
 } spring_sights_t;
 
 /* A quarter of a second later; forgets what is too old. O(records). */
 void spring_sights_turn(spring_sights_t *sights);
 /* Room for one more, numbered and timed; the rest is 0. Never NULL. O(records). */
 spring_sight_t *spring_sights_add(spring_sights_t *sights, uint8_t spring);
-/* One is forgotten. O(records). */
+/* One is forgotten, another may take its place. O(1). */
 void spring_sights_drop(spring_sights_t *sights, const spring_sight_t *sight);
-/* That one goes on: it is the last one again, with the next number. O(records). */
-spring_sight_t *spring_sights_renew(spring_sights_t *sights, const spring_sight_t *sight);
+/* That one goes on: it is the last one again, with the next number. O(1). */
+void spring_sights_renew(spring_sights_t *sights, spring_sight_t *sight);
 /* The last one of a spring; NULL where there is none. O(records). */
 spring_sight_t *spring_sights_newest(spring_sights_t *sights, uint8_t spring);
 /* The oldest of a spring (SPRING_SIGHTS_ANY: of any) whose number is `from` or later; from

@@ -608,14 +608,18 @@ TEST(sight_that_goes_on_is_the_newest_again)
     first->believed = 33;
     (void)spring_sights_add(&sights, 1);
     spring_sights_turn(&sights);
-    const spring_sight_t *const renewed = spring_sights_renew(&sights, first);
-    TEST_ASSERT_EQUAL_PTR(&sights.sight[1], renewed);
+    spring_sights_renew(&sights, first);
+    const spring_sight_t *const renewed = spring_sights_from(&sights, SPRING_SIGHTS_ANY, 9);
+    TEST_ASSERT_EQUAL_PTR(first, renewed);
+    TEST_ASSERT_EQUAL_PTR(first, spring_sights_newest(&sights, 0));
     TEST_ASSERT_EQUAL_UINT8(2, sights.count);
     TEST_ASSERT_EQUAL_UINT8(0, renewed->spring);
     TEST_ASSERT_EQUAL_INT16(33, renewed->believed);
     TEST_ASSERT_EQUAL_UINT32(9, renewed->number);
     TEST_ASSERT_EQUAL_UINT16(0, spring_sights_age_turns(&sights, renewed));
-    TEST_ASSERT_EQUAL_UINT16(1, spring_sights_age_turns(&sights, &sights.sight[0]));
+    const spring_sight_t *const other = spring_sights_from(&sights, SPRING_SIGHTS_ANY, 7);
+    TEST_ASSERT_EQUAL_UINT8(1, other->spring);
+    TEST_ASSERT_EQUAL_UINT16(1, spring_sights_age_turns(&sights, other));
 }
 
 /* Read, proven and not blind: how far from its transformation it is need not be known. */

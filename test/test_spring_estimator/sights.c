@@ -90,13 +90,24 @@ TEST(spring_that_has_most_gives_way)
     unsigned of[THERMAL_MODEL_MAX_SPRINGS] = {0};
     for (unsigned i = 0; i < sights.count; i++) {
         of[sights.sight[i].spring]++;
-        TEST_ASSERT_TRUE(i == 0 || sights.sight[i].number > sights.sight[i - 1u].number);
     }
     for (unsigned k = 0; k < THERMAL_MODEL_MAX_SPRINGS; k++) {
         TEST_ASSERT_EQUAL_UINT(k == 1 ? 6 : 2, of[k]);
     }
     TEST_ASSERT_EQUAL_UINT32(sights.numbers - 1u, spring_sights_newest(&sights, 1)->number);
     TEST_ASSERT_EQUAL_UINT32(7, spring_sights_newest(&sights, 3)->number);
+    /* its newest are kept, and whoever reads on by numbers is told each once, in their order */
+    TEST_ASSERT_EQUAL_UINT32(sights.numbers - 6u,
+                             spring_sights_from(&sights, 1, spring_sights_first(&sights))->number);
+    unsigned told = 0;
+    uint32_t from = spring_sights_first(&sights);
+    for (const spring_sight_t *next;
+         told <= SPRING_SIGHTS_KEPT &&
+         (next = spring_sights_from(&sights, SPRING_SIGHTS_ANY, from)) != NULL;
+         from = next->number + 1u) {
+        told++;
+    }
+    TEST_ASSERT_EQUAL_UINT(SPRING_SIGHTS_KEPT, told);
 }
 
 TEST(sights_are_found_by_number_and_forgotten_after_four_hours)
