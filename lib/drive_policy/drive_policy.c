@@ -138,7 +138,9 @@ static void enter(drive_policy_t *policy, const drive_policy_input_t *in, uint8_
     drive_policy_spring_t *s = &policy->spring[k];
     supply_queue_remove(&policy->queue, k);
     s->floor_ma = s->stage == DRIVE_POLICY_STAGE_HOLD ? s->wanted_ma : 0; /* until its turn */
-    if (s->stage != DRIVE_POLICY_STAGE_OFF && spring_estimator_sees(belief_of(in, k))) {
+    if (stage != DRIVE_POLICY_STAGE_HEAT) { /* in case that it is left */
+        s->partly = !is_full(level_permille);
+    } else if (s->stage != DRIVE_POLICY_STAGE_OFF && spring_estimator_sees(belief_of(in, k))) {
         const spring_bounds_t phase = spring_estimator_austenite(in->belief, in->model, k);
         s->partly = phase.value > PART_LEAST && phase.low < PART_MOST;
     } else if (spring_estimator_possible(belief_of(in, k)) == SPRING_PHASE_MARTENSITE) {
@@ -223,17 +225,23 @@ static void heat(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
     }
     const bool full = is_full(level_permille);
     const float level = 0.001f * (float)level_permille;
-    if (is_limited(policy, in, k) || is_stalled(s) ||
-        (full ? spring_estimator_has_transformed(in->belief, in->model, k)
-              : phase_of(in, k) >= level)) {
+    const bool waits = waits_for_supply(s);
+    const bool ends = is_limited(policy, in, k) || is_stalled(s) ||
+                      (full && spring_estimator_has_transformed(in->belief, in->model, k));
+    const bool asks = !full || s->partly || waits; /* as a rule not, and once */
+    const float phase = !ends && asks ? phase_of(in, k) : 0.0f;
+    if (ends || (!full && phase >= level)) {
         enter(policy, in, k, DRIVE_POLICY_STAGE_HOLD, level_permille);
         return;
     }
-    const bool ahead = s->partly && phase_of(in, k) > 0.5f;
+    /* as it rests there is nothing to wait for at this power: it is over, or needs more. Above its
+     * finish it is over anyway, but for its ends */
+    const bool ahead = s->partly && phase > 0.5f &&
+                       (spring_estimator_changes(b) || c7 > points.austenite_finish_c7);
     const bool slows = (!full || ahead) && c7 > points.austenite_start_c7 - 128;
     /* what it keeps it keeps until its turn: else what its current reads could take it away. It may
      * have begun to lose phase: then it waits where it loses no more */
-    const bool keeps = waits_for_supply(s) && (s->floor_ma != 0 || phase_of(in, k) > 0.5f * level);
+    const bool keeps = waits && (s->floor_ma != 0 || phase > 0.5f * level);
     s->floor_ma = 0;
     if (slows || keeps) {
         const float margin_k = kelvin(policy->parameters.hold_margin_cc);

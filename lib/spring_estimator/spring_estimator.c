@@ -582,8 +582,8 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
 {
     spring_belief_t *b = &e->spring[k];
     /* neither has it come to its finish, nor is that seen */
-    const bool unproven = full && b->heating && !spring_estimator_has_transformed(e, model, k) &&
-                          !surely_finished(b, model, k, 0.0f);
+    const bool unproven = full && b->heating && !surely_finished(b, model, k, 0.0f) &&
+                          !spring_estimator_has_transformed(e, model, k);
     const spring_before_t before = spring_before(b, model, k);
     const bool unseen = full && b->heating && b->possible != SPRING_PHASE_AUSTENITE;
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {

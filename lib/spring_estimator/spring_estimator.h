@@ -337,6 +337,11 @@ static inline bool spring_estimator_on_trial(const spring_belief_t *belief)
 {
     return belief->trial;
 }
+/* While it heats: what it reads still changes as only a transformation explains. */
+static inline bool spring_estimator_changes(const spring_belief_t *belief)
+{
+    return belief->changes;
+}
 /* Turns for which its temperature has hardly moved in its hold, saturating. */
 static inline bool spring_estimator_rests(const spring_belief_t *belief)
 {

@@ -211,6 +211,24 @@ static void take_another_circuit(spring_estimator_t *e, spring_belief_t *b,
     spring_note_read(e, k, step_ohm / own_ohm, b->noise);
 }
 
+/* What its resistance says to be austenite already takes up no latent heat any more. */
+static void take_phase(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
+                       uint8_t k)
+{
+    const float phase = spring_estimator_phase(e, model, k);
+    if ((uint16_t)(phase * (float)THERMAL_MODEL_AUSTENITE_FULL) <=
+        thermal_model_austenite(model, k)) {
+        return;
+    }
+    const int16_t now_c7 = thermal_model_temperature_c7(model, k);
+    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
+    const float width_c7 = (float)(t.austenite_finish_c7 - t.austenite_start_c7);
+    const float reached_c = spring_c((int16_t)(t.austenite_start_c7 + (int16_t)(phase * width_c7)));
+    spring_set_temperature(model, k, reached_c, SPRING_PHASE_MARTENSITE);
+    thermal_model_set_temperature(model, k, now_c7);
+    b->seen = true; /* it is acted on in the next turn */
+}
+
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is
  * a transformation, whatever its sign. */
 void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
@@ -239,6 +257,7 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
     }
     b->run.heat.peak_k = b->run.heat.heat_k;
     if (b->run.heat.mark_ohm == 0.0f) {
+        take_phase(e, b, model, k);
         b->run.heat.mark_ohm = b->ohm;
         b->run.heat.mark_k = b->run.heat.heat_k;
         return;
@@ -274,7 +293,7 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         spring_note_read(e, k, b->run.heat.excess, b->noise);
         b->run.heat.excess = 0.0f; /* from here on: how it grows, or the next one */
     } else if (b->run.heat.flat_k >= FLAT_K) {
-        const float change_seen = b->learnt.austenite_ohm > 0.0f
+        const float change_seen = b->learnt.austenite_ohm > 0.0f || b->run.heat.cold_ohm == 0.0f
                                       ? b->learnt.change
                                       : b->ohm / b->run.heat.onset_ohm - 1.0f;
         const float unseen_k = spring_clamp(FLAT_CHANGE_K / (fabsf(change_seen) + 0.001f) - FLAT_K,

@@ -407,7 +407,8 @@ TEST(way_down_ends_at_its_level)
 /* A heating from a level: from half of the phase on the middle of the wire has its own, and
  * what heats beyond the hold is 0.15 W. Not where surely a fifth or less is missing, as a hold's
  * loss tells it (8 points); a level's own resistances may be off by more than is left (21). From
- * off where it was left so, and may have some still. */
+ * off where it was left so, and may have some still. Once its resistance rests it slows no more,
+ * but above austenite finish. */
 TEST(heating_from_a_level_slows_at_half)
 {
     static const struct {
@@ -432,10 +433,19 @@ TEST(heating_from_a_level_slows_at_half)
         row(n);
         TEST_ASSERT_EQUAL(HEAT, drive_policy_stage(&policy, 0));
         believed(0, table[n].c, B, table[n].phase);
+        of(0)->changes = true;
         policy.spring[0].granted_ma = BOOST_MA;
         turn_of(0);
         const int asks_ma = table[n].slows ? ma_of(GIVES_W + 0.15f) : BOOST_MA;
         TEST_ASSERT_INT_WITHIN(1, asks_ma, policy.spring[0].wanted_ma);
+        of(0)->changes = false;
+        turn_of(0);
+        TEST_ASSERT_EQUAL_UINT16(BOOST_MA, policy.spring[0].wanted_ma);
+        believed(0, 98.1f, B, table[n].phase);
+        turn_of(0);
+        const bool goes_on = table[n].slows || table[n].c < 87.0f;
+        TEST_ASSERT_INT_WITHIN(1, goes_on ? ma_of(GIVES_W + 0.15f) : BOOST_MA,
+                               policy.spring[0].wanted_ma);
     }
     begin(1, 2);
     believed(0, 80.0f, B, 0.15f);
@@ -443,6 +453,7 @@ TEST(heating_from_a_level_slows_at_half)
     level[0] = 900; /* and to a higher one */
     turn_of(0);
     believed(0, 87.1f, B, 0.51f);
+    of(0)->changes = true;
     turn_of(0);
     TEST_ASSERT_INT_WITHIN(1, ma_of(GIVES_W + 0.15f), policy.spring[0].wanted_ma);
 }
