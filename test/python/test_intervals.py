@@ -37,6 +37,11 @@ def test_an_interval_is_in_the_coordinate_that_was_fitted_and_within_the_bounds(
     )
 
 
+def test_a_number_that_the_data_hardly_fix_lies_anywhere_within_its_bounds() -> None:
+    hardly = Fit(Spec(free=FREE[:1]), np.array([0.006]), 0.0, 10, [], covariance=np.array([[1e6]]))
+    assert intervals(hardly)["loss"] == (0.001, 0.1)
+
+
 def test_errors_that_go_together_are_told_without_those_that_nothing_fixes() -> None:
     assert correlations(fitted()) == [("shift", "loss", pytest.approx(0.8))]
     assert correlations(fitted(), 0.9) == []

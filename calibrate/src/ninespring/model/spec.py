@@ -52,7 +52,7 @@ class Free:
 
     def outer(self, z: float) -> float:
         """Map back."""
-        value = math.exp(z) if self.log else z * self.scale
+        value = math.exp(min(z, math.log(self.high))) if self.log else z * self.scale
         return min(self.high, max(self.low, value))
 
     @property
