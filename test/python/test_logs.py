@@ -181,6 +181,30 @@ def test_a_saturated_sensor_a_dead_one_and_a_glitch_are_left_out_and_said(make_l
     assert np.array_equal(np.delete(run.temperature_c, [0, 2, 6], 1), np.delete(clean.temperature_c, [0, 2, 6], 1))
 
 
+def test_thermometers_that_change_places_for_a_while_are_put_back_and_said(make_log) -> None:
+    def mixed_up(columns: dict[str, np.ndarray]) -> None:
+        for rows in (slice(300, 350), slice(540, 542)):
+            columns["t1_c"][rows], columns["t2_c"][rows] = columns["t2_c"][rows].copy(), columns["t1_c"][rows].copy()
+        columns["t4_c"][300:350] += 20.0  # one that jumps by itself
+
+    clean, run = read_log(make_log("clean.csv")), read_log(make_log(change=mixed_up))
+    assert np.array_equal(run.temperature_c[:, :3], clean.temperature_c[:, :3])
+    assert run.temperature_c[300:350, 3] == pytest.approx(clean.temperature_c[300:350, 3] + 20.0)
+    said = [note for note in run.notes if "places" in note]
+    assert len(said) == 1 and said[0].startswith("t1_c and t2_c change places 2 times, the first at 300 s: put back")
+
+
+def test_thermometers_that_change_places_for_good_are_left(make_log) -> None:
+    """Nobody knows which of both times they were right."""
+
+    def mixed_up(columns: dict[str, np.ndarray]) -> None:
+        columns["t1_c"][300:], columns["t2_c"][300:] = columns["t2_c"][300:].copy(), columns["t1_c"][300:].copy()
+
+    clean, run = read_log(make_log("clean.csv")), read_log(make_log(change=mixed_up))
+    assert np.array_equal(run.temperature_c[300:, :2], clean.temperature_c[300:, 1::-1])
+    assert not any("places" in note for note in run.notes)
+
+
 def test_spikes_are_left_out_however_many_and_up_to_four_rows_long(make_log) -> None:
     def loose(columns: dict[str, np.ndarray]) -> None:
         columns["t1_c"][20::45] += 60.0

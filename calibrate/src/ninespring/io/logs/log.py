@@ -173,6 +173,7 @@ def read_log(
         notes.append(f"no temperature of spring {', '.join(without)}: simulated, but not compared")
     mending.mend_placeholders(run)
     mending.refuse_wrong_units(run, table)
+    mending.mend_swapped(run)
     mending.mask_bad_sensors(run)
     mending.mend_first_reading(run)
     mending.mask_glitches(run)

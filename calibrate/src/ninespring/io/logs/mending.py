@@ -1,10 +1,11 @@
 """What is mended of a log without guessing, and what is doubted of it: both are said in `Run.notes`.
 
-Repeated rows, placeholders, gaps, glitches, a saturated, dead or frozen sensor are mended; wrong units are refused or doubted.
+Repeated rows, placeholders, gaps, glitches, swapped readings, a saturated, dead or frozen sensor are mended; wrong units are refused or doubted.
 """
 
 from __future__ import annotations
 
+import itertools
 import warnings
 
 import numpy as np
@@ -210,6 +211,29 @@ def mend_placeholders(run: Run) -> None:
         run.notes.append(
             f"all thermometers jump at once after the first {first} row(s): those are no readings, left out"
         )
+
+
+def mend_swapped(run: Run) -> None:
+    """Two thermometers that show from one row to the next what the other did, and later their own again: a logger mixed up its lines.
+
+    Each is put back. Of those that stay so nobody knows when they were right.
+    """
+    values = run.temperature_c
+    moved = np.abs(np.diff(values, axis=0))
+    noise = np.maximum(np.nan_to_num(noise_floor(values)), 0.02)
+    most = 10.0 * noise + 3.0 * np.quantile(np.nan_to_num(moved), 0.99, axis=0)
+    # between rows further apart a spring may well come to where another was
+    jumps = (moved > most) & (np.diff(run.time_s) < QUICKEST_S / 3.0)[:, None]
+    for a, b in itertools.combinations(np.flatnonzero(jumps.any(axis=0)), 2):
+        crossed = np.abs(values[1:, [a, b]] - values[:-1, [b, a]]) <= most[[a, b]]
+        rows = 1 + np.flatnonzero(jumps[:, [a, b]].all(axis=1) & crossed.all(axis=1))
+        for begin, end in zip(rows[::2], rows[1::2], strict=False):
+            values[begin:end, [a, b]] = values[begin:end, [b, a]]
+        if times := len(rows) // 2:
+            run.notes.append(
+                f"t{a + 1}_c and t{b + 1}_c change places {times} time{'s' * (times > 1)}, the first at "
+                f"{run.time_s[rows[0]]:g} s: put back"
+            )
 
 
 def mask_glitches(run: Run) -> None:
