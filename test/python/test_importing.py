@@ -177,12 +177,47 @@ def test_a_clock_that_was_set_back_is_refused_where_it_was_unless_it_says_its_zo
         "Time,Q1,Q2,T1,T2\n0,50,0,20.5,21\n",
         "Time;Q1;Q2;T1;T2\n0;50;0;20,5;21\n",
         "t_s\tH1\tH2\tT1\tT2\n0\t50\t0\t20.5\t21\n",
+        "Time,Q1,Q2,TC1,TC2\n0,50,0,20.5,21\n",
+        "Time,T1,T2,Q1\n0,20.5,21,50\n",  # the second heater was never driven
     ],
 )
 def test_a_heater_boards_table_is_read_as_its_programs_write_it(tmp_path: Path, form: str) -> None:
     (tmp_path / "logger.csv").write_text(form)
     header, row = importing.import_table(tmp_path / "logger.csv", "tclab").splitlines()[-2:]
-    assert (header, row) == ("time_s,u1,u2,t1_c,t2_c", "0.00000,0.50000,0.00000,20.50000,21.00000")
+    assert dict(zip(header.split(","), map(float, row.split(",")), strict=True)) == {
+        "time_s": 0.0,
+        "u1": 0.5,
+        "u2": 0.0,
+        "t1_c": 20.5,
+        "t2_c": 21.0,
+    }
+
+
+@pytest.mark.parametrize(
+    ("named", "rows"),
+    [
+        ("", "# by me\n# Time,Q1,Q2,T1,T2\n0,50,0,20.5,21\n1,50,0,20.5,21\n"),  # as NumPy writes it
+        ("", "#Time;Q1;Q2;T1;T2;spare\n0;50;0;20,5;21\n1;50;0;20,5;21\n"),
+        ('names = ["Time", "Q1", "Q2", "T1", "T2"]', "0,50,0,20.5,21\n1,50,0,20.5,21\n"),
+        ('names = ["Time", "Q1", "Q2", "T1", "T2"]', "0\t50\t0\t20.5\t21\n1\t50\t0\t20.5\t21\n"),
+    ],
+)
+def test_columns_whose_names_are_a_comment_or_nowhere_are_read(tmp_path: Path, named: str, rows: str) -> None:
+    built_in = importing.BUILT_IN["tclab"].read_text()
+    decimal = 'decimal = ","\n' if ";" in rows else 'decimal = "."\n'
+    (tmp_path / "map.toml").write_text(f"[file]\n{decimal}{named}\n{built_in}")
+    (tmp_path / "logger.csv").write_text(rows)
+    text = importing.import_table(tmp_path / "logger.csv", tmp_path / "map.toml").splitlines()
+    assert text[-2:] == [f"{k}.00000,0.50000,0.00000,20.50000,21.00000" for k in (0, 1)]
+
+
+def test_a_file_without_names_of_its_columns_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    (tmp_path / "logger.csv").write_text("0,50,0,20.5,21\n1,50,0,20.5,21\n")
+    with pytest.raises(InputError, match=r'logger\.csv:1:1: no column .*\[file\] names = \["time", \.\.\.\]'):
+        importing.import_table(tmp_path / "logger.csv", "tclab")
+    (tmp_path / "map.toml").write_text('[file]\nnames = ["t"]\n[columns]\ntime_s = "t"\n')
+    with pytest.raises(InputError, match=r"logger\.csv:1:\d+: 5 cells where the header has 1"):
+        importing.import_table(tmp_path / "logger.csv", tmp_path / "map.toml")
 
 
 def test_scale_comes_before_the_unit_and_offset_after(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import csv
 import itertools
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -50,11 +50,12 @@ BUILT_IN = {path.stem: path for path in Path(__file__).with_name("mappings").glo
 
 _CHARACTER = Annotated[str, Meta(min_length=1, max_length=1, description="one character in quotes")]
 _NAMES = Annotated[list[str], Meta(min_length=1, description="the source's name for it, or a list of names")]
+_NUMBERS = re.compile(r"(?:[\s\d.,;eE+-]|nan)+", re.IGNORECASE)
 _RULE = Keys({"unit": str} | dict.fromkeys(("scale", "offset"), a_number(-FINITE, FINITE)), {"column": _NAMES})
 _MAPPING = Keys(
     {
         "columns": Keys(each=_RULE),
-        "file": Keys({"separator": _CHARACTER, "decimal": _CHARACTER, "skip_lines": whole(0, 10**9)}),
+        "file": Keys({"separator": _CHARACTER, "decimal": _CHARACTER, "skip_lines": whole(0, 10**9), "names": _NAMES}),
         "constants": Keys(each=a_number(-FINITE, FINITE)),
     }
 )
@@ -108,8 +109,13 @@ class _Cells:
     decimal: str
 
 
-def _split(path: str | Path, separator: str = "", decimal: str = "", skip_lines: int = 0) -> _Cells:
-    """Return a table's cells; what is not said of separator and decimal sign its header tells."""
+def _split(
+    path: str | Path, separator: str = "", decimal: str = "", skip_lines: int = 0, names: Sequence[str] = ()
+) -> _Cells:
+    """Return a table's cells; what is not said of separator and decimal sign its header tells.
+
+    The header is the first line, or `names`; above numbers it may be the last comment, where NumPy writes it.
+    """
     raw = read_bytes(path)
     try:
         text = raw.decode("utf-16" if raw[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "utf-8-sig")
@@ -117,14 +123,19 @@ def _split(path: str | Path, separator: str = "", decimal: str = "", skip_lines:
         text = raw.decode("cp1252", "replace")
     if not text.strip():
         raise InputError("the file is empty", path)
-    numbered = enumerate(text.splitlines(), 1)
-    kept = [(n, one) for n, one in numbered if n > skip_lines and one.strip() and one[0] != "#"]
+    numbered = [(n, one) for n, one in enumerate(text.splitlines(), 1) if n > skip_lines and one.strip()]
+    kept = [(n, one) for n, one in numbered if one[0] != "#"]
     if not kept:
         raise InputError("only comments and skipped lines: there is no header", path, 1)
-    numbers, lines = [n for n, _ in kept], [one for _, one in kept]
-    separator = separator or next((one for one in ";\t" if one in lines[0] and "," not in lines[0]), ",")
-    if len(lines) < 2:
-        raise InputError("there is a header but no row", path, numbers[0])
+    first, above = kept[0][1], numbered[: numbered.index(kept[0])]
+    remark = above[-1][1].lstrip("# ") if above and not names and _NUMBERS.fullmatch(first) else ""
+    separator = separator or next(
+        (one for one in ";\t" if one in (remark or first) and "," not in (remark or first)), ","
+    )
+    if remark.count(separator) >= first.count(separator) > 0:
+        kept.insert(0, (above[-1][0], remark))
+    if len(kept) < 2 - bool(names):
+        raise InputError("there is a header but no row", path, kept[0][0])
     rows: list[list[str]] = []
     for number, line in kept:
         try:
@@ -132,10 +143,17 @@ def _split(path: str | Path, separator: str = "", decimal: str = "", skip_lines:
         except csv.Error as error:
             raise InputError(f"{error} (separator '{separator}')", path, number, 1) from None
         rows.append(cells)
+    if names:
+        kept.insert(0, (kept[0][0], separator.join(names)))
+        rows.insert(0, list(names))
+    elif kept[0][1] is remark:
+        del rows[0][len(rows[1]) :]
+    for (number, line), cells in zip(kept, rows, strict=True):
         if len(cells) != len(rows[0]):
             said = f"{len(cells)} cells where the header has {len(rows[0])} (separator '{separator}')"
             raise InputError(said, path, number, len(line) + 1)
     frame = pd.DataFrame(rows[1:], columns=[name.strip() for name in rows[0]], dtype=str)
+    numbers, lines = [n for n, _ in kept], [one for _, one in kept]
     return _Cells(frame, lines, numbers, separator, decimal or ("." if separator == "," else ","))
 
 
@@ -144,12 +162,17 @@ def import_table(path: str | Path, mapping: str | Path) -> str:
 
     The mapping (TOML): `[columns]` gives for each of the log's columns the source's name, or a table {column, unit, scale,
     offset}: the number times `scale` is in `unit`, and `offset`, in the log's own unit, is added at the end. `[file]`
-    may give `separator`, `decimal`, `skip_lines`; `[constants]` gives columns of one value.
+    may give `separator`, `decimal`, `skip_lines`, `names`; `[constants]` gives columns of one value where the file has none.
     """
     rules = _read_mapping(mapping)
     table = _split(path, **rules["file"])
-    out = {name: _column(table, name, rule, path) for name, rule in rules["columns"].items()}
-    out |= {name: np.full(len(table.frame), value) for name, value in rules["constants"].items()}
+    constants = rules["constants"]
+    out = {
+        name: _column(table, name, rule, path)
+        for name, rule in rules["columns"].items()
+        if name not in constants or not table.frame.columns.intersection(rule["column"]).empty
+    }
+    out |= {name: np.full(len(table.frame), value) for name, value in constants.items() if name not in out}
     time_s = out.pop("time_s")
     if (fell := np.flatnonzero(np.diff(time_s) < 0.0)).size:
         said = (
@@ -169,7 +192,10 @@ def _column(table: _Cells, name: str, rule: dict[str, Any], path: str | Path) ->
     found = next((one for one in wanted if one in has), None)
     if found is None:
         known = ", ".join(f"'{one}'" for one in has[:12])
-        raise InputError(f"no column '{wanted[0]}' for {name}: the file has {known}", path, table.numbers[0], 1)
+        nameless = '; without a line of names: [file] names = ["time", ...]' * bool(_NUMBERS.fullmatch(table.lines[0]))
+        raise InputError(
+            f"no column '{wanted[0]}' for {name}: the file has {known}{nameless}", path, table.numbers[0], 1
+        )
     if has.count(found) > 1:
         raise InputError(f"column '{found}' is there twice", path, table.numbers[0], 1)
     cells, iso = table.frame[found].str.strip(), rule["unit"] == "iso"
