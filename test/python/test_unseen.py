@@ -317,6 +317,17 @@ def test_what_foretells_worse_than_the_better_baseline_keeps_its_name_and_the_ba
     ) == plain
 
 
+@pytest.mark.parametrize(("beside_k", "dropped"), [(1.04, False), (1.2, True)])
+def test_numbers_that_foretell_worse_beside_what_is_of_that_day_are_given_as_they_are_without(
+    beside_k: float, dropped: bool
+) -> None:
+    """What bends takes up what is the array's, and goes: its numbers would be those of no array."""
+    found = model("shared_air", "ambient_drift")
+    told = Told({"": 3.0, "lag": 2.0, "shared_air": 1.0, "shared_air ambient_drift": beside_k})
+    told.splits = [SimpleNamespace(alone=False)]  # type: ignore[list-item]
+    assert told.given(found, without).spec.effects == (("shared_air",) if dropped else found.spec.effects)
+
+
 def test_the_model_that_is_given_foretells_in_the_rooms_that_first_minutes_tell() -> None:
     """What would be better in rooms that nobody knows predicts no run."""
 

@@ -294,6 +294,8 @@ class _Case:
     """Effects that foretell a run no better, in words."""
     plain: bool = False
     """The model that is given is the better baseline: it foretells better than what was found, whose names stay."""
+    carried: Fit | None = None
+    """What is given in place of the final fit where that foretells worse: without what is of that day."""
 
     @property
     def adopted(self) -> list[str]:
@@ -345,7 +347,7 @@ def _diagnose(
         problem.take_for(None)
         case.final = replace(case.final, jacobian=slopes)
     heat = unknown_heat.find(problem, case.final, progress)
-    final = given = case.final
+    final, given = case.final, case.carried or case.final
     if case.plain:
         given = _finish(problem, judged_by.refitted(search.Search(problem, case.search.candidates, case.declared)))
     told = results.Diagnosis(
@@ -568,6 +570,8 @@ def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> re
             case.witnesses.setdefault(effect, witness(problem, case.final, effect, without, False))
     if why:
         return judged_by.told(judged_by.plain, why)
+    given = judged_by.given(case.final, judge.reduced)
+    case.carried = None if given is case.final else _finish(problem, given)
     return _given(case, judged_by, judged_by.carried(case.final, judge.reduced))
 
 
