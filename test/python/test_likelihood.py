@@ -267,6 +267,13 @@ def test_a_run_that_was_heated_before_says_nothing_of_its_room() -> None:
     assert room.over_first(runs, [22.1, 22.9, 10.0, 10.0, 10.0]) == pytest.approx((0.1, 0.3 * math.sqrt(1.5)), abs=0.01)
 
 
+def test_how_far_above_its_room_a_run_begins_that_was_heated_before_is_its_own() -> None:
+    """That others began so says little of one that begins at rest: it is not so much warmer than its room."""
+    runs = [one_run(28.0, 28.0, 0.0), one_run(28.2, 28.2, 0.0)]
+    assert room.over_first(runs, [26.0, 26.2]) == pytest.approx((-2.0, 2.0 * math.sqrt(1.5)), abs=0.05)
+    assert room.over_first(runs, [30.0, 30.2]) == pytest.approx((2.0, 0.3 * math.sqrt(1.5)), abs=0.05)
+
+
 def test_a_fit_looks_for_a_room_where_its_run_began_or_where_others_were() -> None:
     runs = [one_run(at, at, 0.0) for at in (18.0, 24.0, 45.0)]
     bounds = room.believed(runs)

@@ -147,8 +147,10 @@ def over_first(runs: Sequence[Run], ambient_c: Sequence[float]) -> tuple[float, 
     over = np.array([room - first_c(run) for run, room, cold in parts if cold])
     if not over.size:
         return None
-    apart = max(SAME_K, float(np.std(over, ddof=1))) if over.size > 1 else MOVES_K
-    return float(np.mean(over)), apart * math.sqrt(1.0 + 1.0 / over.size)
+    mean = float(np.mean(over))
+    # a run that begins warmer than its room was heated before: how long ago is its own
+    apart = max(SAME_K, float(np.std(over, ddof=1)), -mean) if over.size > 1 else MOVES_K
+    return mean, apart * math.sqrt(1.0 + 1.0 / over.size)
 
 
 def without(off: np.ndarray, moves: np.ndarray, sigma_k: float, alike: float) -> np.ndarray:
