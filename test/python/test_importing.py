@@ -160,6 +160,27 @@ def test_a_logger_with_dates_quotes_and_an_old_character_set_is_read(tmp_path: P
     assert [[float(cell) for cell in row] for row in rows] == [[0, 20.5, 0.5], [1.5, 21, 0]]
 
 
+@pytest.mark.parametrize(
+    ("unit", "stamps"),
+    [
+        ("%H:%M:%S", ("23:10:09", "23:10:10")),
+        ("%M:%S.%f", ("00:09.50", "00:10.50")),
+        ("%m/%d/%Y %I:%M:%S %p", ("03/05/2024 02:00:59 PM", "03/05/2024 02:01:00 PM")),
+        ("%d.%m.%Y %H:%M:%S", ("31.12.2024 23:59:59", "01.01.2025 00:00:00")),
+    ],
+)
+def test_a_clock_is_read_as_the_mapping_says_that_it_is_written(
+    tmp_path: Path, unit: str, stamps: tuple[str, str]
+) -> None:
+    (tmp_path / "map.toml").write_text(f'[columns]\ntime_s = {{column = "Time", unit = "{unit}"}}\nt1_c = "T"\n')
+    (tmp_path / "log.csv").write_text("Time,T\n" + "".join(f"{one},20\n" for one in stamps))
+    text = importing.import_table(tmp_path / "log.csv", tmp_path / "map.toml")
+    assert text.endswith("\n0.00000,20.00000\n1.00000,20.00000\n")
+    (tmp_path / "log.csv").write_text("Time,T\n2024-03-05 soon,20\n")
+    with pytest.raises(InputError, match="'2024-03-05 soon' in column 'Time' is not a time as '%"):
+        importing.import_table(tmp_path / "log.csv", tmp_path / "map.toml")
+
+
 def test_a_clock_that_was_set_back_is_refused_where_it_was_unless_it_says_its_zone(tmp_path: Path) -> None:
     (tmp_path / "map.toml").write_text('[columns]\ntime_s = {column = "Time", unit = "iso"}\nt1_c = "T"\n')
     clock, log = ["02:59:59", "02:00:01"], tmp_path / "log.csv"
@@ -178,6 +199,7 @@ def test_a_clock_that_was_set_back_is_refused_where_it_was_unless_it_says_its_zo
         "Time;Q1;Q2;T1;T2\n0;50;0;20,5;21\n",
         "t_s\tH1\tH2\tT1\tT2\n0\t50\t0\t20.5\t21\n",
         "Time,Q1,Q2,TC1,TC2\n0,50,0,20.5,21\n",
+        " Time   Q1  Q2    T1  T2 \n    0   50   0  20.5  21 \n",
         "Time,T1,T2,Q1\n0,20.5,21,50\n",  # the second heater was never driven
     ],
 )

@@ -88,14 +88,23 @@ def _read_mapping(mapping: str | Path) -> dict[str, Any]:
                 said = f"'{name}' is not a log's column (time_s, i1_a, v1_v, u1, t1_c, fan, ambient_c)"
                 raise file.refuse(said, (kind, name), True)
     for name, rule in given["columns"].items():
-        if (unit := rule.setdefault("unit", "")) not in UNITS and (name, unit) != ("time_s", "iso"):
+        if (unit := rule.setdefault("unit", "")) not in UNITS and not (name == "time_s" and _is_clock(unit)):
             known = ", ".join(filter(None, UNITS))
-            raise file.refuse(f"unknown unit '{unit}' for {name}: {known}; time_s: iso", ("columns", name))
+            raise file.refuse(f"unknown unit '{unit}' for {name}: {known}; time_s: iso, %H:%M:%S", ("columns", name))
     if "time_s" not in given["columns"]:
         raise file.refuse("the mapping has no time_s under [columns]", ("columns",))
     if "decimal" in given["file"] and given["file"]["decimal"] == given["file"].get("separator"):
         raise file.refuse("separator and decimal cannot be the same", ("file", "separator"))
     return given
+
+
+def _is_clock(unit: str) -> bool:
+    """Return whether this says how a clock's times are written: ISO 8601, or a pattern as of strptime."""
+    try:
+        pd.to_datetime([""], format="ISO8601" if unit == "iso" else unit, errors="coerce")
+    except ValueError:
+        return False
+    return unit == "iso" or bool(re.search("%[A-Za-z]", unit))
 
 
 @dataclass
@@ -130,7 +139,7 @@ def _split(
     first, above = kept[0][1], numbered[: numbered.index(kept[0])]
     remark = above[-1][1].lstrip("# ") if above and not names and _NUMBERS.fullmatch(first) else ""
     separator = separator or next(
-        (one for one in ";\t" if one in (remark or first) and "," not in (remark or first)), ","
+        (one for one in ";\t " if one in (remark or first) and "," not in (remark or first)), ","
     )
     if remark.count(separator) >= first.count(separator) > 0:
         kept.insert(0, (above[-1][0], remark))
@@ -139,7 +148,7 @@ def _split(
     rows: list[list[str]] = []
     for number, line in kept:
         try:
-            (cells,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
+            (cells,) = csv.reader([line.strip(" ")], delimiter=separator, skipinitialspace=True)
         except csv.Error as error:
             raise InputError(f"{error} (separator '{separator}')", path, number, 1) from None
         rows.append(cells)
@@ -198,10 +207,11 @@ def _column(table: _Cells, name: str, rule: dict[str, Any], path: str | Path) ->
         )
     if has.count(found) > 1:
         raise InputError(f"column '{found}' is there twice", path, table.numbers[0], 1)
-    cells, iso = table.frame[found].str.strip(), rule["unit"] == "iso"
+    cells, unit, clock = table.frame[found].str.strip(), rule["unit"], rule["unit"] not in UNITS
     empty = cells.isin(["", "nan", "NaN", "NA", "-", "None"])
-    if iso:
-        stamps = pd.to_datetime(cells.where(~empty), errors="coerce", format="ISO8601", utc=True)
+    if clock:
+        written = "ISO8601" if unit == "iso" else unit
+        stamps = pd.to_datetime(cells.where(~empty), errors="coerce", format=written, utc=True)
         values = (stamps - stamps.iloc[0]).dt.total_seconds()
     else:
         plain = cells.str.replace(table.decimal, ".", regex=False)
@@ -210,14 +220,16 @@ def _column(table: _Cells, name: str, rule: dict[str, Any], path: str | Path) ->
     if bad.size:
         row = int(bad[0]) + 1
         shown, before = cells.iloc[row - 1], table.lines[row].split(table.separator)[: has.index(found)]
-        hint = ' (decimal = ","?)' if "," in shown and not iso and table.decimal != "," else ""
+        hint = ' (decimal = ","?)' if "," in shown and not clock and table.decimal != "," else ""
+        time = "time: 2026-01-31 12:00:00.5 is one" if unit == "iso" else f"time as '{unit}'"
+        said = time if clock else 'number; a clock? unit = "iso" or "%H:%M:%S"' if ":" in shown else "number"
         raise InputError(
-            f"'{shown}' in column '{found}' is not a {'time: 2026-01-31 12:00:00.5 is one' if iso else 'number'}{hint}",
+            f"'{shown}' in column '{found}' is not a {said}{hint}",
             path,
             table.numbers[row],
             1 + sum(len(one) + 1 for one in before),
         )
-    factor, offset = (1.0, 0.0) if iso else UNITS[rule["unit"]]
+    factor, offset = (1.0, 0.0) if clock else UNITS[unit]
     return values.to_numpy(float) * factor * rule.get("scale", 1.0) + offset + rule.get("offset", 0.0)
 
 
