@@ -35,7 +35,12 @@ LIMITS = {
     ),
     "i": (-0.5, 20.0, "A", "looks like milliamperes: divide by 1000 (`ninespring import --map`)"),
     "v": (-0.5, 60.0, "V", "looks like millivolts: divide by 1000 (`ninespring import --map`)"),
-    "u": (-1e-9, 1.0 + 1e-9, "", "commands run from 0 to 1: a command in % is divided by 100"),
+    "u": (
+        -1e-9,
+        1.0 + 1e-9,
+        "",
+        "commands run from 0 to 1: a command in % is divided by 100, what a controller asks beyond that is cut off",
+    ),
     "t": (-60.0, 400.0, "degC", "not a spring's temperature: leave the cell empty if not measured"),
     "f": (-0.5, 100.0, "N", "looks like millinewtons or grams: a load is in N (`ninespring import --map`)"),
     "fan": (-1e-9, 1.0 + 1e-9, "", "the fan runs from 0 to 1: a fan in % is divided by 100"),
