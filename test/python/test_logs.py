@@ -64,6 +64,7 @@ SLOW = "".join(f"{500 * n},{n // 100 % 2},{20.0 + 0.1 * (n % 7):g}\n" for n in r
         ("time_s,i1_a,i1_a,t1_c\n0,1,1,20\n", 1, "twice"),
         ("time_s,t1_c\n0,20\n1,20\n2,20\n", 1, "neither currents"),
         ("i1_a,t1_c\n1,20\n", 1, "time_s"),
+        ("time_s,u1,t1_c\n0,1,20\n1,-18.5,20\n2,1,20\n", (3, 3), "what a controller asks beyond that is cut off"),
         (HEADER + "0,1500,20\n1,1500,20\n2,1500,20\n", 2, "milliamperes"),
         (HEADER + "0,0,68\n1,0,68.1\n2,1,68.2\n3,1,69\n4,1,70\n", 2, "Fahrenheit"),
         (HEADER + "0,0,293\n1,0,293\n2,1,294\n3,1,295\n4,1,296\n", 2, "kelvin"),

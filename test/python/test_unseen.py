@@ -319,13 +319,18 @@ def test_what_foretells_worse_than_the_better_baseline_keeps_its_name_and_the_ba
 
 @pytest.mark.parametrize(("beside_k", "dropped"), [(1.04, False), (1.2, True)])
 def test_numbers_that_foretell_worse_beside_what_is_of_that_day_are_given_as_they_are_without(
-    beside_k: float, dropped: bool
+    monkeypatch: pytest.MonkeyPatch, beside_k: float, dropped: bool
 ) -> None:
     """What bends takes up what is the array's, and goes: its numbers would be those of no array."""
     found = model("shared_air", "ambient_drift")
     told = Told({"": 3.0, "lag": 2.0, "shared_air": 1.0, "shared_air ambient_drift": beside_k})
     told.splits = [SimpleNamespace(alone=False)]  # type: ignore[list-item]
     assert told.given(found, without).spec.effects == (("shared_air",) if dropped else found.spec.effects)
+    monkeypatch.setattr(diagnosis, "_finish", lambda problem, fit: fit)
+    case: Any = SimpleNamespace(problem=told.problem, final=found, hidden=[], carried=None, plain=None)
+    diagnosis._foretold(case, SimpleNamespace(reduced=without), told)  # type: ignore[arg-type]
+    assert case.final is found, "what was found is told"
+    assert (case.carried is not None) == dropped
 
 
 def test_the_model_that_is_given_foretells_in_the_rooms_that_first_minutes_tell() -> None:
