@@ -91,6 +91,24 @@ def with_one_after_the_other(found: search.Search, *names: str) -> Fit:
     return fit
 
 
+def test_quick_heaters_with_slow_thermometers_are_not_taken_for_slow_ones_that_a_camera_sees(tmp_path: Path) -> None:
+    """What heats a neighbour is as quick as the heaters are: the readings follow together, as if each were a mean of both."""
+    time_s, drive = 2.0 * np.arange(600.0), levels(np.random.default_rng(3))
+    plant = native.Plant(1, 2)
+    plant.set_effects(["sensor_lag"])
+    plant.set_all(
+        {"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.1, "orthogonal_w_per_k": 0.02, "sensor_lag_s": 140.0}
+    )
+    plant.set_all({"command_power_w[1]": 7.0, "command_power_w[2]": 3.5})
+    plant.reset()
+    shown = plant.simulate(time_s, native.COMMAND, drive) + np.random.default_rng(4).normal(0.0, 0.1, (600, 2))
+    columns = {f"u{k + 1}": drive[:, k] for k in range(2)} | {f"t{k + 1}_c": shown[:, k] for k in range(2)}
+    (tmp_path / "log.csv").write_text(log_text(time_s, columns))
+    found = diagnosis.diagnose(Array(1, 2), [read_log(tmp_path / "log.csv", 2)], model=heaters())
+    (one,) = found.result["effects"]
+    assert one["name"] == "sensor_lag" and one["parameters"]["sensor_lag_s"]["value"] == pytest.approx(140.0, rel=0.03)
+
+
 def test_an_alloy_that_went_astray_before_its_company_came_begins_again_beside_it(tmp_path: Path) -> None:
     found = searched_pulse(tmp_path / "pulse.csv")
     astray = with_one_after_the_other(found, "latent_heat", "ambient_drift")

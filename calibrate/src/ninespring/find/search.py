@@ -164,6 +164,10 @@ class Search:
         best = min(begun, key=lambda one: one.chi2)
         if race:
             best = self.problem.fit(spec, best.as_dict(), tolerance=1e-3, max_steps=STEPS, near=best)
+        for mirror in (one.mirror for one in added if one.mirror):
+            start = best.as_dict() | mirror(best.as_dict(), self.problem.base_value)
+            other = self.problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS)
+            best = min(best, other, key=lambda one: one.chi2)
         if best.chi2 > fit.chi2:  # it lost on the way what it began with: with next to nothing added it has all of it
             start = fit.as_dict()
             for candidate in added:

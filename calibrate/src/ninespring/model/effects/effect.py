@@ -29,6 +29,8 @@ class Candidate:
     most: float = 3.0
     """How many times its probe size a forecast may use."""
     more_starts: tuple[Mapping[str, float], ...] = ()
+    mirror: Callable[[Mapping[str, float], Callable[[str], float]], Mapping[str, float]] | None = None
+    """Where else a fit's numbers (those not free as declared) explain nearly the same: a fit that has come to one begins at the other, too."""
     also_on: tuple[str, ...] = ()
     """Further effects of the plant that carry it."""
     neutral: float = 0.0
