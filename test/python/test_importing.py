@@ -205,7 +205,8 @@ def test_a_clock_that_was_set_back_is_refused_where_it_was_unless_it_says_its_zo
 )
 def test_a_heater_boards_table_is_read_as_its_programs_write_it(tmp_path: Path, form: str) -> None:
     (tmp_path / "logger.csv").write_text(form)
-    header, row = importing.import_table(tmp_path / "logger.csv", "tclab").splitlines()[-2:]
+    *keys, header, row = importing.import_table(tmp_path / "logger.csv", "tclab").splitlines()
+    assert keys[-1] == "# sensor: semiconductor"
     assert dict(zip(header.split(","), map(float, row.split(",")), strict=True)) == {
         "time_s": 0.0,
         "u1": 0.5,
@@ -266,7 +267,7 @@ def test_frames_are_put_into_a_log_on_its_clock(tmp_path: Path) -> None:
     broken = {"t1_c": np.array([20.0, 21.0, 22.0, 50.0])}  # the camera stood still from 2 s to 30 s
     long = tmp_path / "long.csv"
     long.write_text(log_text(np.arange(32.0), {"i1_a": np.ones(32)}))
-    between = importing.merge_into_log(long, np.array([0.0, 1.0, 2.0, 30.0]), 1.0, 0.0, broken).splitlines()[2:]
+    between = importing.merge_into_log(long, np.array([0.0, 1.0, 2.0, 30.0]), 1.0, 0.0, broken).splitlines()[3:]
     assert [k for k, row in enumerate(between) if not row.endswith(",")] == [0, 1, 2, 30]
     with pytest.raises(InputError, match="never meet"):
         importing.merge_into_log(log, None, 2.0, 900.0, rising)

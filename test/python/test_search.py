@@ -242,6 +242,24 @@ def test_a_camera_that_sees_the_surroundings_beyond_the_array_makes_no_edge_loss
     assert found.result["unexplained"] is False
 
 
+@pytest.mark.parametrize(
+    ("declared", "logged", "seen"),
+    [
+        ("", "", True),
+        ("camera", "", True),
+        ("thermocouple", "", False),
+        ("", "semiconductor", False),
+        ("camera", "semiconductor", True),
+        ("", "a good one", True),
+    ],
+)
+def test_what_touches_a_spring_sees_no_other(tmp_path: Path, declared: str, logged: str, seen: bool) -> None:
+    path = commanded(tmp_path / "log.csv", {})
+    path.write_text(f"# sensor: {logged}\n" + path.read_text())
+    array = Array(1, 2, sensor={"kind": declared} if declared else {})
+    assert ("optical_mixing" in names_of(Problem(array, [read_log(path, 2)]))) == seen
+
+
 def test_a_blur_over_more_than_the_nearest_is_found_as_it_is(make_log) -> None:
     camera = {"optical_share": 0.6, "optical_width": 1.2, "optical_shape": 1.0}
     found = diagnosis.diagnose(Array(), [read_log(make_log(effects={"optical_mixing": camera}), 9)])

@@ -17,10 +17,11 @@ import pandas as pd
 from msgspec import Meta
 
 from ..errors import InputError
-from .logs import COLUMN, LIMITS, MAX_SPRINGS, log_text, number_in, read_bytes, read_table, read_text
+from .logs import COLUMN, LIMITS, MAX_SPRINGS, SENSORS, log_text, number_in, read_bytes, read_table, read_text
 from .logs.mending import longest_step
 from .toml_file import Keys, TomlFile, whole
 from .toml_file import number as a_number
+from .toml_file import table as a_table
 
 UNITS: dict[str, tuple[float, float]] = {
     "": (1.0, 0.0),
@@ -54,6 +55,7 @@ _NUMBERS = re.compile(r"(?:[\s\d.,;eE+-]|nan)+", re.IGNORECASE)
 _RULE = Keys({"unit": str} | dict.fromkeys(("scale", "offset"), a_number(-FINITE, FINITE)), {"column": _NAMES})
 _MAPPING = Keys(
     {
+        "sensor": a_table({}, {"kind": SENSORS}),
         "columns": Keys(each=_RULE),
         "file": Keys({"separator": _CHARACTER, "decimal": _CHARACTER, "skip_lines": whole(0, 10**9), "names": _NAMES}),
         "constants": Keys(each=a_number(-FINITE, FINITE)),
@@ -192,7 +194,8 @@ def import_table(path: str | Path, mapping: str | Path) -> str:
     for name in out:
         if re.fullmatch(r"t\d+_c", name):
             _refuse_kelvin(out[name], f'unit = "K" for {name} in the mapping converts', path)
-    return log_text(time_s, out, {"imported_from": Path(path).name, "mapping": Path(str(mapping)).name}, 5)
+    keys = {"imported_from": Path(path).name, "mapping": Path(str(mapping)).name}
+    return log_text(time_s, out, keys | ({"sensor": rules["sensor"]["kind"]} if rules.get("sensor") else {}), 5)
 
 
 def _column(table: _Cells, name: str, rule: dict[str, Any], path: str | Path) -> np.ndarray:
@@ -421,4 +424,4 @@ def merge_into_log(
         for before, after in itertools.pairwise(when[good]):
             if after - before > longest_s:
                 line[(time_s > before) & (time_s < after)] = np.nan
-    return log_text(time_s, merged, table.keys | {"temperatures_from": "camera frames"}, 5)
+    return log_text(time_s, merged, table.keys | {"temperatures_from": "camera frames", "sensor": "camera"}, 5)

@@ -7,6 +7,7 @@ from .log import EXTRA as EXTRA
 from .log import LIMITS as LIMITS
 from .log import MAX_SPRINGS as MAX_SPRINGS
 from .log import read_log as read_log
+from .run import SENSORS as SENSORS
 from .run import DriveMode as DriveMode
 from .run import Run as Run
 from .table import Table as Table

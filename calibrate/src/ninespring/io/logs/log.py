@@ -14,7 +14,7 @@ import numpy as np
 from ..ranges import LOG_TIME_S
 from ..statistics import rounding
 from . import mending
-from .run import DriveMode, Run
+from .run import SENSORS, DriveMode, Run
 from .table import Table
 from .writing import sha256_of
 
@@ -262,5 +262,6 @@ def _run_of(table: Table, frame: pd.DataFrame, letter: str, count: int, has_volt
         layers=_layers(table, count),
         load_n=load,
         notes=notes,
+        sensor=next((one for one in SENSORS if one == table.keys.get("sensor")), ""),
         of_board=table.keys.get("version", "").startswith("ninespring "),
     )

@@ -11,6 +11,8 @@ import numpy as np
 from .branch import hotter_before
 
 DriveMode = Literal["power", "current", "command"]
+SENSORS = ("camera", "thermocouple", "thermistor", "resistance", "semiconductor")
+"""What measures temperatures: the first sees more than one spring, the others touch each its own."""
 
 
 @dataclass
@@ -35,6 +37,8 @@ class Run:
     load_n: np.ndarray | None = None
     """(n, k), N, or None where the log has none; row r holds until time r + 1."""
     notes: list[str] = field(default_factory=list)
+    sensor: str = ""
+    """One of SENSORS, where the log says which."""
     of_board: bool = False
     """Currents and voltages are a board's: its voltages step."""
     warm: bool = False

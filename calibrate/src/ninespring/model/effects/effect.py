@@ -112,6 +112,8 @@ class Scene:
     """By how much a run alone that begins at rest does so above its logged room, K."""
     load_moves: bool = False
     """A load was logged, and was not always the same."""
+    camera: bool = True
+    """What shows the temperatures may see more than one spring at once."""
     reads_ohm: bool = False
     """The readings are the springs' own resistances."""
 

@@ -14,7 +14,7 @@ NEAREST = 0.1
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
-    if scene.springs < 2:
+    if scene.springs < 2 or not scene.camera:
         return
     # springs at one distance tell a share, at two its width, at more its shape
     distances = len({row**2 + col**2 for row in range(scene.rows) for col in range(scene.cols)} - {0})
