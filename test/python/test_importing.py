@@ -238,9 +238,31 @@ def test_a_file_without_names_of_its_columns_is_refused_with_what_to_do(tmp_path
     (tmp_path / "logger.csv").write_text("0,50,0,20.5,21\n1,50,0,20.5,21\n")
     with pytest.raises(InputError, match=r'logger\.csv:1:1: no column .*\[file\] names = \["time", \.\.\.\]'):
         importing.import_table(tmp_path / "logger.csv", "tclab")
+    (tmp_path / "logger.csv").write_text("# 3 May, by me, at home, 20 W, the lid closed\n0,50,0,20.5,21\n")
+    with pytest.raises(InputError, match=r'no column .* has \'3 May\'.*\[file\] names = \["time", \.\.\.\]'):
+        importing.import_table(tmp_path / "logger.csv", "tclab")
+    (tmp_path / "logger.csv").write_text("0,50,0,20.5,21\n1,50,0,20.5,21\n")
     (tmp_path / "map.toml").write_text('[file]\nnames = ["t"]\n[columns]\ntime_s = "t"\n')
     with pytest.raises(InputError, match=r"logger\.csv:1:\d+: 5 cells where the header has 1"):
         importing.import_table(tmp_path / "logger.csv", tmp_path / "map.toml")
+
+
+def test_a_file_without_times_has_a_period(tmp_path: Path) -> None:
+    (tmp_path / "logger.csv").write_text("I,T\n1,20\n1,20.5\n1,21\n")
+    columns = '[columns]\ni1_a = "I"\nt1_c = "T"\n'
+    (tmp_path / "map.toml").write_text("[file]\nperiod_s = 2.5\n" + columns)
+    rows = importing.import_table(tmp_path / "logger.csv", tmp_path / "map.toml").splitlines()[-3:]
+    assert [float(row.split(",")[0]) for row in rows] == [0.0, 2.5, 5.0]
+    (tmp_path / "map.toml").write_text("[file]\nperiod_s = 2.5\n" + columns + 'time_s = "I"\n')
+    with pytest.raises(InputError, match="time_s and a period_s: give one"):
+        importing.import_table(tmp_path / "logger.csv", tmp_path / "map.toml")
+
+
+def test_millivolts_are_not_taken_for_kelvin(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("Time,I,T\n" + "".join(f"{k},1,{710 + k}\n" for k in range(5)))
+    (tmp_path / "map.toml").write_text('[columns]\ntime_s = "Time"\ni1_a = "I"\nt1_c = "T"\n')
+    with pytest.raises(InputError, match=r"no room in degC, degF or K: raw counts, millivolts\?"):
+        importing.import_table(tmp_path / "t.csv", tmp_path / "map.toml")
 
 
 def test_scale_comes_before_the_unit_and_offset_after(tmp_path: Path) -> None:

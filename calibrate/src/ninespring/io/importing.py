@@ -42,8 +42,8 @@ UNITS: dict[str, tuple[float, float]] = {
 
 FINITE = 1e300
 MOST_PIXELS = 100_000
-COLDEST_ROOM_K = LIMITS["ambient_c"][0] + 273.15
-"""Springs that are never colder than this number are in kelvin: even the coldest room is above it, in kelvin."""
+COLDEST_ROOM_K, HOTTEST_ROOM_K = (one + 273.15 for one in LIMITS["ambient_c"][:2])
+"""Springs that are never colder than the first are in kelvin, as even the coldest room is; than the second: in nothing that a room is told in."""
 
 BUILT_IN = {path.stem: path for path in Path(__file__).with_name("mappings").glob("*.toml")}
 """Mappings that come with the tool: `--map tclab`."""
@@ -57,7 +57,10 @@ _MAPPING = Keys(
     {
         "sensor": a_table({}, {"kind": SENSORS}),
         "columns": Keys(each=_RULE),
-        "file": Keys({"separator": _CHARACTER, "decimal": _CHARACTER, "skip_lines": whole(0, 10**9), "names": _NAMES}),
+        "file": Keys(
+            {"separator": _CHARACTER, "decimal": _CHARACTER, "skip_lines": whole(0, 10**9), "names": _NAMES}
+            | {"period_s": a_number(1e-6, 1e6)}
+        ),
         "constants": Keys(each=a_number(-FINITE, FINITE)),
     }
 )
@@ -93,8 +96,9 @@ def _read_mapping(mapping: str | Path) -> dict[str, Any]:
         if (unit := rule.setdefault("unit", "")) not in UNITS and not (name == "time_s" and _is_clock(unit)):
             known = ", ".join(filter(None, UNITS))
             raise file.refuse(f"unknown unit '{unit}' for {name}: {known}; time_s: iso, %H:%M:%S", ("columns", name))
-    if "time_s" not in given["columns"]:
-        raise file.refuse("the mapping has no time_s under [columns]", ("columns",))
+    if (timed := "time_s" in given["columns"]) == ("period_s" in given["file"]):
+        said = "time_s and a period_s: give one" if timed else "no time_s under [columns], nor a period_s under [file]"
+        raise file.refuse(f"the mapping has {said}", ("columns",))
     if "decimal" in given["file"] and given["file"]["decimal"] == given["file"].get("separator"):
         raise file.refuse("separator and decimal cannot be the same", ("file", "separator"))
     return given
@@ -118,6 +122,8 @@ class _Cells:
     numbers: list[int]
     separator: str
     decimal: str
+    nameless: bool
+    """The first line is numbers, or a comment that may be anything but names."""
 
 
 def _split(
@@ -165,7 +171,8 @@ def _split(
             raise InputError(said, path, number, len(line) + 1)
     frame = pd.DataFrame(rows[1:], columns=[name.strip() for name in rows[0]], dtype=str)
     numbers, lines = [n for n, _ in kept], [one for _, one in kept]
-    return _Cells(frame, lines, numbers, separator, decimal or ("." if separator == "," else ","))
+    nameless = lines[0] is remark or bool(_NUMBERS.fullmatch(lines[0]))
+    return _Cells(frame, lines, numbers, separator, decimal or ("." if separator == "," else ","), nameless)
 
 
 def import_table(path: str | Path, mapping: str | Path) -> str:
@@ -173,9 +180,10 @@ def import_table(path: str | Path, mapping: str | Path) -> str:
 
     The mapping (TOML): `[columns]` gives for each of the log's columns the source's name, or a table {column, unit, scale,
     offset}: the number times `scale` is in `unit`, and `offset`, in the log's own unit, is added at the end. `[file]`
-    may give `separator`, `decimal`, `skip_lines`, `names`; `[constants]` gives columns of one value where the file has none.
+    may give `separator`, `decimal`, `skip_lines`, `names`, `period_s` where no column is a time; `[constants]` gives columns of one value where the file has none.
     """
     rules = _read_mapping(mapping)
+    period_s = rules["file"].pop("period_s", 0.0)
     table = _split(path, **rules["file"])
     constants = rules["constants"]
     out = {
@@ -184,7 +192,7 @@ def import_table(path: str | Path, mapping: str | Path) -> str:
         if name not in constants or not table.frame.columns.intersection(rule["column"]).empty
     }
     out |= {name: np.full(len(table.frame), value) for name, value in constants.items() if name not in out}
-    time_s = out.pop("time_s")
+    time_s = out.pop("time_s", period_s * np.arange(len(table.frame)))
     if (fell := np.flatnonzero(np.diff(time_s) < 0.0)).size:
         said = (
             f"the time falls by {-np.diff(time_s)[fell[0]]:g} s: two runs in one file? Make two files. "
@@ -193,7 +201,9 @@ def import_table(path: str | Path, mapping: str | Path) -> str:
         raise InputError(said, path, table.numbers[int(fell[0]) + 2], 1)
     for name in out:
         if re.fullmatch(r"t\d+_c", name):
-            _refuse_kelvin(out[name], f'unit = "K" for {name} in the mapping converts', path)
+            _refuse_kelvin(
+                out[name], f'unit = "K" for {name} in the mapping converts (millivolts: scale, offset)', path
+            )
     keys = {"imported_from": Path(path).name, "mapping": Path(str(mapping)).name}
     return log_text(time_s, out, keys | ({"sensor": rules["sensor"]["kind"]} if rules.get("sensor") else {}), 5)
 
@@ -204,7 +214,7 @@ def _column(table: _Cells, name: str, rule: dict[str, Any], path: str | Path) ->
     found = next((one for one in wanted if one in has), None)
     if found is None:
         known = ", ".join(f"'{one}'" for one in has[:12])
-        nameless = '; without a line of names: [file] names = ["time", ...]' * bool(_NUMBERS.fullmatch(table.lines[0]))
+        nameless = '; without a line of names: [file] names = ["time", ...]' * table.nameless
         raise InputError(
             f"no column '{wanted[0]}' for {name}: the file has {known}{nameless}", path, table.numbers[0], 1
         )
@@ -384,7 +394,9 @@ def reduce_frames(
 def _refuse_kelvin(temperature: np.ndarray, advice: str, path: str | Path) -> None:
     """Refuse temperatures that are never below a cold room's in kelvin: no array is so hot from beginning to end."""
     if np.isfinite(temperature).any() and (coldest := float(np.nanmin(temperature))) > COLDEST_ROOM_K:
-        raise InputError(f"nothing is ever colder than {coldest:.0f}: looks like kelvin, {advice}", path)
+        raw = "that is no room in degC, degF or K: raw counts, millivolts?"
+        said = f"looks like kelvin, {advice}" if coldest < HOTTEST_ROOM_K else raw
+        raise InputError(f"nothing is ever colder than {coldest:.0f}: {said}", path)
 
 
 def merge_into_log(
