@@ -374,7 +374,15 @@ def test_one_column_in_fahrenheit_is_refused_by_its_name_and_a_hot_start_is_not(
     [
         (lambda c: c.update(time_s=np.arange(600.0) * 120), "milliseconds"),
         (lambda c: c.update(time_s=np.arange(600.0) / 60), "minutes"),
-        (lambda c: c["ambient_c"].__setitem__(0, 0.0), "jumps from 0 to 20"),
+        (lambda c: c["ambient_c"].__setitem__(slice(300, None), 30.0), "jumps from 20 to 30"),
+        (
+            lambda c: c.update(
+                {f"t{k}_c": c[f"t{k}_c"] * 1.8 + 32 for k in range(1, 10)}
+                | {"i1_a": np.maximum(c["i1_a"], 0.5), "v1_v": np.maximum(c["v1_v"], 0.1)}
+                | {"ambient_c": np.full(600, np.nan)}
+            ),
+            "in Fahrenheit would be a room",
+        ),
         (
             lambda c: c.update({f"{a}{k}_{b}": c[f"{x}{k}_{y}"].copy() for k in range(1, 10) for a, b, x, y in SWAP}),
             "currents and voltages are swapped",
@@ -391,6 +399,15 @@ def test_one_column_in_fahrenheit_is_refused_by_its_name_and_a_hot_start_is_not(
 def test_what_is_possible_but_unlikely_is_said(make_log, change, word: str) -> None:
     assert any(word in note for note in read_log(make_log(change=change)).notes)
     assert not any(word in note for note in read_log(make_log("good.csv")).notes)
+
+
+def test_spikes_of_an_ambient_are_left_out_and_said(make_log) -> None:
+    def spiky(columns: dict[str, np.ndarray]) -> None:
+        columns["ambient_c"][[0, 100, 101, 350]] = -18.0, 40.0, 41.0, 0.0
+
+    run = read_log(make_log(change=spiky))
+    assert run.ambient_c is not None and np.ptp(run.ambient_c) == 0.0
+    assert "ambient_c: 4 isolated spike(s) left out, the first, -18 degC, at 0 s" in run.notes
 
 
 def test_quotes_a_byte_order_mark_and_other_line_ends_change_nothing(make_log) -> None:

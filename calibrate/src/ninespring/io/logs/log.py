@@ -182,6 +182,7 @@ def read_log(
     mending.mask_bad_sensors(run)
     mending.mend_first_reading(run)
     mending.mask_glitches(run)
+    mending.mend_ambient(run)
     mending.find_gaps(run)
     run.warm = mending.begins_warm(run)
     run.rounding_c = rounding(run.temperature_c, run.starts)

@@ -16,6 +16,8 @@ from .branch import BEGINS_S, FEWEST, STEADY_K, hotter_before, moved_k
 from .run import Run
 from .table import Table
 
+JUMP_K = 5.0
+"""The air of a room does not go so far from one row to the next."""
 LONGEST_S = 60.0 * 86400.0
 """No bench logs two months in one go: a longer log is in milliseconds."""
 SPARSE_S = 100.0
@@ -25,6 +27,8 @@ FEW = 0.01
 """Part of the rows: so many times may be there twice, as programs log that simulate by steps. More are of a clock that is too coarse."""
 RESTED_K = 3.0
 """How far below its first readings a spring may come that began at its room: a room drifts, in Fahrenheit twice as far."""
+ROOM_C, ROOM_K = 22.0, 6.0
+"""A room of which nothing is known: most are within so many kelvin of it."""
 QUICKER = 4.0
 """Times as far as from row to row afterwards a thermometer may go in its first row, rows being as far apart as its spring is slow."""
 QUICKEST_S = 15.0
@@ -114,14 +118,19 @@ def doubt_units(run: Run) -> None:
         run.notes.append(f"the rows are {usual:g} s apart: is the time in milliseconds?")
     if run.duration_s < 60.0 and len(run.time_s) >= 60:
         run.notes.append(f"the whole log lasts {run.duration_s:.3g} s: is the time in minutes or hours?")
-    if run.ambient_c is not None and np.isfinite(run.temperature_c).any():
-        coldest, ambient = float(np.nanmin(run.temperature_c)), float(np.median(run.ambient_c))
-        if coldest > 45.0 and abs((coldest - 32.0) / 1.8 - ambient) < 5.0:
+    read = run.temperature_c[np.isfinite(run.temperature_c).any(axis=1)]
+    if read.size:
+        coldest = float(np.nanmin(read))
+        ambient, within = (ROOM_C, ROOM_K) if run.ambient_c is None else (float(np.median(run.ambient_c)), 5.0)
+        # what only rises from where it begins begins at its room
+        begins = run.ambient_c is not None or float(np.nanmin(read[:5])) - coldest < RESTED_K
+        if coldest > 45.0 and begins and abs((coldest - 32.0) / 1.8 - ambient) < within:
+            room = "a room" if run.ambient_c is None else f"the ambient, {ambient:.0f} degC"
             run.notes.append(
-                f"no spring is ever below {coldest:.0f}, which in Fahrenheit would be the ambient, {ambient:.0f} degC: "
+                f"no spring is ever below {coldest:.0f}, which in Fahrenheit would be {room}: "
                 "are the temperatures in Fahrenheit?"
             )
-    if run.ambient_c is not None and np.any(jumps := np.abs(np.diff(run.ambient_c)) > 5.0):
+    if run.ambient_c is not None and np.any(jumps := np.abs(np.diff(run.ambient_c)) > JUMP_K):
         at = int(np.flatnonzero(jumps)[0])
         run.notes.append(
             f"ambient_c jumps from {run.ambient_c[at]:g} to {run.ambient_c[at + 1]:g} degC at {run.time_s[at + 1]:g} s: "
@@ -298,6 +307,20 @@ def mend_first_reading(run: Run) -> None:
         if abs(jump) > 10.0 * max(float(noise[k]), 0.02) + most:
             run.temperature_c[0, k] = values[1]
             run.notes.append(f"t{k + 1}_c: the first reading, {values[0]:g} degC, is a spike, left out")
+
+
+def mend_ambient(run: Run) -> None:
+    """A few rows of an ambient far from those around them: the air of a room does not jump and come back."""
+    if run.ambient_c is None or len(run.ambient_c) < 9:
+        return
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(run.ambient_c, 4, mode="reflect"), 9)
+    around = np.median(windows, axis=1)
+    bad = np.abs(run.ambient_c - around) > JUMP_K
+    if bad.any():
+        first = int(np.flatnonzero(bad)[0])
+        said = f"ambient_c: {bad.sum()} isolated spike(s) left out, the first, {run.ambient_c[first]:g} degC, at {run.time_s[first]:g} s"
+        run.notes.append(said)
+        run.ambient_c = np.where(bad, around, run.ambient_c)
 
 
 def begins_warm(run: Run) -> bool:
