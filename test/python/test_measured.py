@@ -88,9 +88,7 @@ def test_where_nothing_found_predicts_as_well_the_model_is_the_better_baseline_a
     assert unseen.rmse_c <= 1.05 * min(unseen.declared_rmse_c, unseen.with_lag_rmse_c)
     assert "The model is the declared model with a lag, by least squares" in unseen.text
     assert unseen.text in verdict(found.told)
-    problem, fit, _ = diagnosis.fit_effects(
-        Array(1, 2), [run.part(slice(half))], ["sensor_lag"], declared=declared().parameters
-    )
+    problem, fit, _ = diagnosis.fit_effects(Array(1, 2), [run.part(slice(half))], ["sensor_lag"], model=declared())
     second = run.part(slice(half, None))
     later = replace(second, time_s=second.time_s - second.time_s[0])
     off = [

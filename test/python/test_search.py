@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from command import ended
 from made import searched
 from ninespring.find import diagnosis, evidence, experiments, residual, search
 from ninespring.find.plan import plan_experiment
@@ -23,7 +24,7 @@ from ninespring.io.logs import log_text, read_log
 from ninespring.io.logs.run import Run
 from ninespring.io.recording import script_lines
 from ninespring.model import effects, native
-from ninespring.model.models import Array, Model
+from ninespring.model.models import Array, Model, model_text, read_model
 from ninespring.model.spec import Spec
 from two_heaters import levels
 
@@ -107,6 +108,17 @@ def test_quick_heaters_with_slow_thermometers_are_not_taken_for_slow_ones_that_a
     found = diagnosis.diagnose(Array(1, 2), [read_log(tmp_path / "log.csv", 2)], model=heaters())
     (one,) = found.result["effects"]
     assert one["name"] == "sensor_lag" and one["parameters"]["sensor_lag_s"]["value"] == pytest.approx(140.0, rel=0.03)
+
+
+def test_a_fit_begins_with_a_model_that_is_given(tmp_path: Path) -> None:
+    log, declared = commanded(tmp_path / "log.csv", {"sensor_lag": {"sensor_lag_s": 20.0}}), heaters()
+    declared.effects = ["sensor_lag"]
+    (tmp_path / "declared.toml").write_text(model_text(declared))
+    words = "fit", "--model", tmp_path / "declared.toml", log, "-o", tmp_path / "model.toml"
+    assert ended(*words)[0] == 0
+    fitted = read_model(tmp_path / "model.toml")
+    assert fitted.effects == ["sensor_lag"] and fitted.parameters["heat_capacity_j_per_k"] == 2.0
+    assert fitted.parameters["sensor_lag_s"] == pytest.approx(20.0, rel=0.05)
 
 
 def test_an_alloy_that_went_astray_before_its_company_came_begins_again_beside_it(tmp_path: Path) -> None:

@@ -44,13 +44,22 @@ MOST_TOLD = 8
 Examples:
   ninespring fit run1.csv run2.csv -o model.toml
   ninespring fit --effects latent_heat,shared_air run1.csv -o model.toml
+  ninespring fit --model declared.toml run1.csv -o model.toml
 """)
 @click.argument("logs", nargs=-1, required=True, type=FILE)
 @ARRAY
+@click.option("--model", "model_path", type=FILE, help="model.toml: declared values and effects already on")
 @click.option("--effects", default="", help="effects to switch on and fit, comma-separated")
 @output("model.toml to write")
 @JSON
-def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: Path, json_path: Path | None) -> None:
+def fit(
+    logs: tuple[Path, ...],
+    array_path: Path | None,
+    model_path: Path | None,
+    effects: str,
+    output: Path,
+    json_path: Path | None,
+) -> None:
     """Fit the declared model, with the effects named, to logs.
 
     Logs of a board alone, currents and voltages without any temperature, are fitted to v / i: each spring's transformation
@@ -62,15 +71,18 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     for path in logs:
         if steady.is_steady(path):
             raise InputError("a steady table: `ninespring diagnose` fits it, effect by effect", path, 1)
-    array, runs = array_and_runs(model_and_array(None, array_path)[1], logs)
+    declared, array = model_and_array(model_path, array_path)
+    array, runs = array_and_runs(array, logs)
     notes_of(runs)
     if from_resistance.has_none(runs):
-        if wanted:
-            raise InputError("without a thermometer the effects are looked for: leave --effects out", logs[0])
+        if wanted or declared:
+            raise InputError(
+                "without a thermometer the effects are looked for: leave --effects and --model out", logs[0]
+            )
         _fit_from_resistance(array, runs, output, json_path)
         return
     with working("fitting") as say:
-        problem, chosen, base = diagnosis.fit_effects(array, runs, wanted, say)
+        problem, chosen, base = diagnosis.fit_effects(array, runs, wanted, say, declared)
         say("held-out blocks")
         held = problem.holdout_rmse(chosen)
         say("what v / i says")

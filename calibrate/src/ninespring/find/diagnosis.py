@@ -795,19 +795,20 @@ def fit_effects(
     runs: Sequence[Run],
     wanted: Sequence[str],
     progress: Callable[[str], None] = lambda text: None,
-    declared: Mapping[str, float] | None = None,
+    model: Model | None = None,
 ) -> tuple[Problem, Fit, Fit]:
-    """Fit the declared model with the effects named; return the problem, the fit and the declared model's fit.
+    """Fit the declared model, or one that is given, with the effects named beside its own; return the problem, the fit and the declared model's fit.
 
     What of them no temperature shows, but v / i may, is in neither: `by_resistance` has it.
     """
     with threadpool_limits(1):
-        problem = prepare(array, runs, declared)
+        problem = prepare(array, runs, model.parameters if model else None)
         known = effects.candidates(scene_of(problem))
-        base = first_fit(problem, base_spec(problem))
+        spec = base_spec(problem)
+        base = first_fit(problem, with_effects_of(spec, model, known, False) if model else spec)
         found = search.Search(problem, known, base, progress)
         fit = base
-        for effect in wanted:
+        for effect in (one for one in wanted if one not in base.spec.effects):
             screen = found.screen(fit)
             options = [k for k, c in enumerate(screen.candidates) if c.effect == effect]
             if not options and effect in resistance.OF_THE_WIRE:
