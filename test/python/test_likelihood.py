@@ -196,6 +196,20 @@ def test_a_run_that_began_warm_is_not_taken_for_one_at_rest() -> None:
     assert value == pytest.approx(22.0, abs=0.3) and sigma < 1.0
 
 
+def test_rooms_that_were_alike_tell_more_than_what_a_run_begins_at() -> None:
+    """They were so though their runs began as far apart as a board cools from run to run."""
+    tells_nothing = native.Plant(1, 1)
+    tells_nothing.set_all({"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 1e-5})
+    runs, next_one = [one_run(24.0, at, 0.0) for at in (25.0, 27.0, 30.0)], one_run(21.5, 21.5, 0.0)
+
+    def told(*rooms: float) -> float:
+        return room.Rooms.of(runs, rooms, tells_nothing).told(next_one, tells_nothing)[0]
+
+    assert told(23.9, 24.0, 24.1) > 22.9
+    assert told(20.0, 24.0, 28.0) < 22.0
+    assert room.spread_k([24.0]) == pytest.approx(room.ROOMS_K), "of one room that is all that is known"
+
+
 def test_a_run_whose_thermometers_are_apart_did_not_begin_as_those_at_rest() -> None:
     """Its coldest is no warmer than a room, and may yet have been driven: what the first minute says decides."""
 

@@ -47,8 +47,9 @@ def in_its_room(model: Model, run: Run) -> Run:
     plant = plant_of(model)
     known = model.provenance
     over = known.get("room_over_first_k"), known.get("room_over_first_sigma_k")
-    misses_k = known.get("room_first_minute_misses_k", 0.0)
-    value, sigma = room.Rooms(plant.get("ambient_c"), None if None in over else over, misses_k).told(run, plant)
+    spread_k, misses_k = known.get("room_spread_k", room.ROOMS_K), known.get("room_first_minute_misses_k", 0.0)
+    told = room.Rooms(plant.get("ambient_c"), spread_k, None if None in over else over, misses_k)
+    value, sigma = told.told(run, plant)
     said = f"no ambient_c: by the first minute the room is at {value:.1f} degC (+-{sigma:.1f})"
     return replace(run, ambient_c=np.full(len(run.time_s), value), notes=[*run.notes, said])
 

@@ -96,6 +96,7 @@ def model_of(
     }
     if rooms:
         told = room.Rooms.of([problem.runs[r] for r in rooms], constants, problem.plant_for(fit.spec, fit.values))
+        model.provenance["room_spread_k"] = told.spread_k
         model.provenance["room_first_minute_misses_k"] = told.misses_k
         if told.over:
             model.provenance["room_over_first_k"], model.provenance["room_over_first_sigma_k"] = told.over

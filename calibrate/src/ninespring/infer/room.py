@@ -165,13 +165,19 @@ def without(off: np.ndarray, moves: np.ndarray, sigma_k: float, alike: float) ->
     return off - shift * moves
 
 
-def guessed(run: Run, usual_c: float, over: tuple[float, float] | None) -> list[Guess]:
+def spread_k(ambient_c: Sequence[float]) -> float:
+    """Return one sigma of another run's room about the mean of these, K: rooms of two days are ROOMS_K apart, until more of them say otherwise."""
+    square = 0.5 * ROOMS_K**2 + float(np.sum((np.array(ambient_c) - np.mean(ambient_c)) ** 2))
+    return math.sqrt(square * (1.0 + 1.0 / len(ambient_c)) / len(ambient_c))
+
+
+def guessed(run: Run, usual_c: float, over: tuple[float, float] | None, spread_k: float = ROOMS_K) -> list[Guess]:
     """Return what is believed of a run's room before it moves.
 
     Rooms of other days say one thing. What other runs began like says another, if this one began so, too: it may have begun warm,
     and is then anywhere within WARM_K above its room. Where its thermometers are apart it did, but for the coldest, perhaps.
     """
-    warm = Guess(0.0, usual_c, ROOMS_K)
+    warm = Guess(0.0, usual_c, spread_k)
     first, apart = _begins_at(run)
     if over is None or not math.isfinite(first):
         return [warm]
@@ -252,6 +258,8 @@ class Rooms:
     """What the runs that a model was fitted to tell of another run's room."""
 
     usual_c: float
+    spread_k: float = ROOMS_K
+    """As `spread_k` has it."""
     over: tuple[float, float] | None = None
     """As `over_first` has it."""
     misses_k: float = 0.0
@@ -267,11 +275,13 @@ class Rooms:
         unknown = [Guess(0.0, usual, ANYWHERE_K)]
         parts = zip(runs, ambient_c, strict=True)
         off = [_shown(run, plant, unknown)[0] - fitted for run, fitted in parts if begun(run) is not None]
-        return Rooms(usual, over_first(runs, ambient_c), statistics.rms([np.array(off)]) if off else 0.0)
+        return Rooms(
+            usual, spread_k(ambient_c), over_first(runs, ambient_c), statistics.rms([np.array(off)]) if off else 0.0
+        )
 
     def told(self, run: Run, plant: native.Plant) -> tuple[float, float]:
         """Return how warm the room of a run is and one sigma of it, as a fitted plant shows its first minute."""
-        return _shown(run, plant, guessed(run, self.usual_c, self.over), self.misses_k)
+        return _shown(run, plant, guessed(run, self.usual_c, self.over, self.spread_k), self.misses_k)
 
 
 def _shown(run: Run, plant: native.Plant, guess: Sequence[Guess], misses_k: float = 0.0) -> tuple[float, float]:
