@@ -33,6 +33,7 @@ def scene_of(problem: Problem) -> Scene:
         all(run.ambient_c is not None for run in runs),
         room.above_logged(runs[0]) if len(runs) == 1 else None,
         any(run.load_n is not None and np.ptp(run.load_n) > 0.0 for run in runs),
-        any((problem.array.sensor.get("kind") or run.sensor or SENSORS[0]) == SENSORS[0] for run in runs),
+        # of a kind that nobody has heard of anything may be
+        any((problem.array.sensor.get("kind") or run.sensor) not in SENSORS[1:] for run in runs),
         problem.reads_ohm,
     )

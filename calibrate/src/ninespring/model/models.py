@@ -14,7 +14,7 @@ from typing import Any
 
 from .. import __version__
 from ..errors import InputError
-from ..io.logs import SENSORS, Run
+from ..io.logs import Run
 from ..io.toml_file import At, Keys, TomlFile, did_you_mean, number, table, whole
 from . import cooling, native, stiffness
 
@@ -52,7 +52,7 @@ TABLES = {
     "array": Keys({"pitch_mm": number(0.1, 1000.0), **_BOARD_SHAPE}, _SHAPE),
     "spring": table(SPRING_KEYS),
     "material": table(MATERIAL_KEYS),
-    "sensor": table({"noise_c": (0.0, 50.0)}, {"kind": SENSORS}),
+    "sensor": Keys({"kind": str, "noise_c": number(0.0, 50.0)}),
     "stiffness": table(STIFFNESS_KEYS, stiffness.WORDS),
     "board": Keys(each=table(BOARD_KEYS)),
 }
