@@ -325,7 +325,9 @@ def test_numbers_that_foretell_worse_beside_what_is_of_that_day_are_given_as_the
     found = model("shared_air", "ambient_drift")
     told = Told({"": 3.0, "lag": 2.0, "shared_air": 1.0, "shared_air ambient_drift": beside_k})
     told.splits = [SimpleNamespace(alone=False)]  # type: ignore[list-item]
-    assert told.given(found, without).spec.effects == (("shared_air",) if dropped else found.spec.effects)
+    assert told.given(found, told.carried(found, without)).spec.effects == (
+        ("shared_air",) if dropped else found.spec.effects
+    )
     monkeypatch.setattr(diagnosis, "_finish", lambda problem, fit: fit)
     case: Any = SimpleNamespace(problem=told.problem, final=found, hidden=[], carried=None, plain=None)
     diagnosis._foretold(case, SimpleNamespace(reduced=without), told)  # type: ignore[arg-type]

@@ -570,9 +570,10 @@ def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> re
             case.witnesses.setdefault(effect, witness(problem, case.final, effect, without, False))
     if why:
         return judged_by.told(judged_by.plain, why)
-    given = judged_by.given(case.final, judge.reduced)
+    carried = judged_by.carried(case.final, judge.reduced)
+    given = judged_by.given(case.final, carried)
     case.carried = None if given is case.final else _finish(problem, given)
-    return _given(case, judged_by, judged_by.carried(case.final, judge.reduced))
+    return _given(case, judged_by, carried)
 
 
 def _by_least_squares(case: _Case) -> search.Search:

@@ -262,11 +262,11 @@ class Unseen:
                 fit = reduced(fit, effect)
         return fit
 
-    def given(self, fit: Fit, reduced: Callable[[Fit, str], Fit]) -> Fit:
-        """Return what a model is made of: a fit, or that without what is of that day, where beside it the other numbers foretell worse:
-        what bends has taken up what is the array's."""
-        bare, colour = self.carried(fit, reduced), self.problem.colour
-        return bare if self.foretells(fit, colour) > WORSE * self.foretells(bare, colour) else fit
+    def given(self, fit: Fit, carried: Fit) -> Fit:
+        """Return what a model is made of: a fit, or that without what is of that day (`carried`), where beside it the other numbers
+        foretell worse: what bends has taken up what is the array's."""
+        colour = self.problem.colour
+        return carried if self.foretells(fit, colour) > WORSE * self.foretells(carried, colour) else fit
 
     def kept(self, fit: Fit, reduced: Callable[[Fit, str], Fit]) -> tuple[Fit | None, list[str]]:
         """Return what predicts no worse than the better of both, names left out one by one, None where nothing of it does; and
