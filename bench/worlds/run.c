@@ -10,6 +10,7 @@
 #define LATER_START_S 90.0
 #define NINE_MORE_S   30.0
 #define TRACE_TICKS   10   /* 0.2 s */
+#define WARM_K        5.0  /* left of what the board had given as its power went */
 #define GIVES_UP_S    30.0 /* after it was reached: the heating itself is over */
 
 typedef struct {
@@ -39,6 +40,11 @@ static bool power_on(bench_t *bench)
         return false;
     }
     belief_restore(&bench->controller, &bench->memory);
+    for (int k = 0; k < world_springs(bench->world); k++) { /* as lib/warm_mark has it */
+        if (world_mean_c(bench->world, k) > bench->run->world.ambient_c + WARM_K) {
+            controller_doubt_cold(&bench->controller);
+        }
+    }
     controller_set_pattern(&bench->controller, bench->run->on);
     (void)controller_set_fan(&bench->controller, bench->run->fan_percent);
     return controller_set_policy(&bench->controller, DRIVE_POLICY_PRECOMPENSATE);

@@ -17,8 +17,9 @@ bool console_inputs_line(console_t *console, console_out_t *out)
         text_add_values(line, FLASH_TEXT("<learnt|spring:#0|"), &number);
         telemetry_add_hex(line, &learnt, sizeof learnt);
     } else {
-        const int32_t values[] = {controller->ambient_c7, controller_fan_percent(controller)};
-        text_add_values(line, FLASH_TEXT("<start|ambient_c7:#0|fan:#0"), values);
+        const int32_t values[] = {controller->ambient_c7, controller_fan_percent(controller),
+                                  controller_may_be_warm(controller)};
+        text_add_values(line, FLASH_TEXT("<start|ambient_c7:#0|fan:#0|warm:#0"), values);
         (void)controller_restart(controller, &console->settings->controller);
         (void)telemetry_set(console->telemetry, TELEMETRY_INPUTS, TELEMETRY_TICKS_PER_S);
     }

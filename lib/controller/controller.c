@@ -163,6 +163,9 @@ static void start(controller_t *controller, const controller_settings_t *setting
     circuit_source_begin(&controller->source, &settings->current);
     (void)safety_init(&controller->safety, &settings->safety, controller->springs, NULL);
     spring_estimator_restart(&controller->estimator, model);
+    if (controller->ceiling.delivered || controller->ceiling.doubtful) {
+        controller_doubt_cold(controller);
+    }
     (void)drive_policy_init(&controller->policy, &settings->policy, model, NULL);
     spring_estimator_prepare(&controller->estimator, model, settings->policy.observer != 0);
     tell_resistances(controller);
@@ -822,6 +825,7 @@ void controller_set_temperature(controller_t *controller, int16_t temperature_c7
 void controller_doubt_cold(controller_t *controller)
 {
     controller->ceiling.doubtful = true;
+    spring_estimator_doubt(&controller->estimator);
 }
 
 bool controller_may_be_warm(controller_t *controller)

@@ -20,8 +20,9 @@
 
 #define EXPLAINED_LEAST 0.005f /* of a resistance: what a sensor's steps leave in one turn */
 
-#define LOOK_MOST  0.4f
-#define LOOK_TURNS 3
+#define LOOK_MOST    0.4f
+#define LOOK_TURNS   3
+#define LOOK_WARMS_K 3.0f /* beyond the hottest that it may be */
 
 float spring_clamp(float value, float low, float high)
 {
@@ -135,6 +136,7 @@ static void begin_unknown(spring_estimator_t *e, thermal_model_t *model, uint8_t
     spring_estimator_restore(e, k, &learnt);
     begin(b, middle_c, UNIFORM_SD * width_k + TRUST_SD_K /* of ambient */, SPRING_PHASE_ANY);
     b->hottest_c = SPRING_ESTIMATOR_HOTTEST_C;
+    b->untested = true;
     spring_set_temperature(model, k, middle_c, SPRING_PHASE_MARTENSITE);
     spring_seal(e, k);
 }
@@ -147,6 +149,7 @@ static void begin_all(spring_estimator_t *e, thermal_model_t *model, bool keeps_
     spring_begin_shared(e);
     e->sights.numbers = 0;
     e->broken_seals = 0;
+    e->doubtful = false;
     spring_seal_shared(e);
     for (uint8_t k = 0; k < e->springs; k++) {
         open_anew(e, k, keeps_learnt);
@@ -168,6 +171,13 @@ void spring_estimator_restart(spring_estimator_t *e, thermal_model_t *model)
     begin_all(e, model, true);
 }
 
+void spring_estimator_doubt(spring_estimator_t *e)
+{
+    spring_open_shared(e);
+    e->doubtful = true;
+    spring_seal_shared(e);
+}
+
 void spring_estimator_trust_spring(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
 {
     if (!spring_is_sound(e, k)) {
@@ -178,7 +188,7 @@ void spring_estimator_trust_spring(spring_estimator_t *e, const thermal_model_t 
           austenite == 0                              ? SPRING_PHASE_MARTENSITE
           : austenite == THERMAL_MODEL_AUSTENITE_FULL ? SPRING_PHASE_AUSTENITE
                                                       : SPRING_PHASE_BETWEEN);
-    e->spring[k].told = austenite == 0;
+    e->spring[k].untested = austenite == 0;
     spring_open_shared(e);
     spring_note(e, model, k, SPRING_SIGHT_TOLD, &(spring_before_t){0}, 0.0f, 0.0f);
     spring_seal_shared(e);
@@ -302,48 +312,40 @@ void spring_keep_above(spring_estimator_t *e, spring_belief_t *b, thermal_model_
 }
 
 /* After power-on what was learnt before tells the phase, and so between which temperatures it is.
- * Where someone said that it is martensite, it tells whether that can be. */
+ * While nobody watched, a crimp or a sensor may have become another one: then hot austenite reads
+ * as martensite did, or the other way round. So it is believed where what is known without it says
+ * the same, that springs may be hot or cannot be; else its spring waits until it is cold. Where
+ * someone said that it is martensite, it tells whether that can be. */
 static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
     const spring_learnt_t *l = &b->learnt;
-    const bool told = b->told && b->possible == SPRING_PHASE_MARTENSITE;
-    if ((b->possible != SPRING_PHASE_ANY && !told) || b->current_a < STRONG_A ||
+    const bool told = b->possible == SPRING_PHASE_MARTENSITE;
+    if (!b->untested || (b->possible != SPRING_PHASE_ANY && !told) || b->current_a < STRONG_A ||
         b->fresh < LOOK_TURNS) {
         return;
     }
-    b->told = false; /* it is heated from here on: of a later look nobody has said anything */
-    if (l->austenite_ohm == 0.0f) {
+    const float unsure = LOOK_SD + SPRING_ESTIMATOR_BOUND_SDS * b->noise / fabsf(l->change);
+    b->untested = !told && unsure > LOOK_MOST; /* told: of one that was heated nobody said it */
+    if (l->austenite_ohm == 0.0f || unsure > LOOK_MOST) {
         return;
     }
-    const float unsure = LOOK_SD + SPRING_ESTIMATOR_BOUND_SDS * b->noise / fabsf(l->change);
-    if (unsure > LOOK_MOST) {
+    const bool may_be_hot = told || e->doubtful;
+    const float austenite = 1.0f - (1.0f - b->slow_ohm / l->austenite_ohm) / l->change;
+    if (may_be_hot ? austenite <= 1.0f - unsure : austenite >= unsure) {
         return;
     }
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
-    const float austenite = 1.0f - (1.0f - b->slow_ohm / l->austenite_ohm) / l->change;
-    int16_t low_c7 = t.martensite_finish_c7;
-    int16_t high_c7 = t.austenite_finish_c7;
-    uint8_t phase = SPRING_PHASE_BETWEEN;
-    if (told && austenite <= 1.0f - unsure) {
-        return;
-    }
-    if (austenite < unsure) {
-        low_c7 = thermal_model_ambient_c7(model);
-        high_c7 = t.austenite_start_c7;
-        phase = SPRING_PHASE_MARTENSITE;
-    } else if (austenite > 1.0f - unsure) {
-        low_c7 = t.martensite_start_c7;
-        phase = SPRING_PHASE_AUSTENITE;
-    }
+    const int16_t low_c7 = may_be_hot ? t.martensite_start_c7 : thermal_model_ambient_c7(model);
+    const int16_t high_c7 = may_be_hot ? t.austenite_finish_c7 : t.austenite_start_c7;
+    const uint8_t phase = may_be_hot ? SPRING_PHASE_AUSTENITE : SPRING_PHASE_MARTENSITE;
     const float middle_c = 0.5f * (spring_c(low_c7) + spring_c(high_c7));
     const uint8_t fresh = b->fresh;
     const bool heating = b->heating;
     const spring_before_t before = spring_before(b, model, k);
     const float sd_k = UNIFORM_SD * spring_c((int16_t)(high_c7 - low_c7));
     begin(b, middle_c, sd_k, phase);
-    spring_set_temperature(model, k, middle_c,
-                           austenite > 0.5f ? SPRING_PHASE_AUSTENITE : SPRING_PHASE_MARTENSITE);
+    spring_set_temperature(model, k, middle_c, phase);
     b->last_c7 = thermal_model_temperature_c7(model, k);
     b->fresh = fresh;
     b->seen = true;
@@ -373,9 +375,12 @@ static void cool(spring_estimator_t *e, spring_belief_t *b, const thermal_model_
     const float above_k = b->hottest_c - spring_ambient_c(model);
     b->hottest_c += SPRING_ESTIMATOR_TURN_S * (power_w - LEAST_LOSS * e->loss_w_per_k * above_k) /
                     hottest_capacity_j_per_k(e, b, &t);
+    /* what does not tell it within a second or two does not for the power of a look */
+    b->untested = b->untested && b->hottest_c < SPRING_ESTIMATOR_HOTTEST_C + LOOK_WARMS_K;
     if (b->hottest_c < spring_c(t.martensite_finish_c7)) {
         const spring_before_t before = spring_before(b, model, k);
         b->possible = SPRING_PHASE_MARTENSITE;
+        b->untested = false;
         spring_begin_shared_heating(e, b, model, k);
         spring_note(e, model, k, SPRING_SIGHT_COOLED, &before, 0.0f, 0.0f);
     }

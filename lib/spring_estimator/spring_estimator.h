@@ -137,7 +137,8 @@ typedef struct {
     bool rough : 1;    /* the line is of few turns, not of a spring at rest */
     bool steep : 1;    /* and its resistance still changes as only that explains */
     bool changes : 1;  /* so it does, whether its beginning was seen or not */
-    bool told : 1;     /* it is martensite because someone said so */
+    bool untested : 1; /* as it began nothing was known, or someone said that it is martensite;
+                        * what it reads has not been compared with what was learnt since */
     bool trial : 1;    /* held with less power, to tell what its resistance has changed by */
     bool hot : 1;      /* in its hold it reads beyond what its austenite read when that was hot */
     bool unlike : 1;   /* this heating's martensite was not of the declared resistance */
@@ -190,7 +191,8 @@ typedef struct {
     /* one was found colder, or read hotter, than anything known explains */
     uint16_t stepped_turns; /* of all springs: for so many more it counts as lately */
     uint8_t stepped_spring;
-    bool stepped_hotter;
+    bool stepped_hotter : 1;
+    bool doubtful : 1; /* as they began they may have been hot: springs of which nothing is known */
     uint8_t broken_seals;   /* found so far, saturating: what was believed had changed by itself */
     spring_sights_t sights; /* for whoever asks why */
 } spring_estimator_t;
@@ -207,6 +209,9 @@ typedef struct {
 void spring_estimator_init(spring_estimator_t *estimator, thermal_model_t *model);
 /* The same, but what was learnt stays: of an estimator that was initialised, or is 0. */
 void spring_estimator_restart(spring_estimator_t *estimator, thermal_model_t *model);
+/* Of springs of which nothing is known: the board has heated them before, and nobody waited since.
+ * What they read is martensite then for none of them, and else austenite for none. */
+void spring_estimator_doubt(spring_estimator_t *estimator);
 /* Takes what it needs of the model's parameters; whether readings are used. What is believed stays.
  */
 void spring_estimator_prepare(spring_estimator_t *estimator, const thermal_model_t *model,
@@ -309,10 +314,11 @@ static inline uint8_t spring_estimator_possible(const spring_belief_t *belief)
 {
     return belief->possible;
 }
-/* What was learnt before would tell its phase, if a current flowed. */
+/* What was learnt before would tell its phase, if a current flowed: it has not yet. */
 static inline bool spring_estimator_may_look(const spring_estimator_t *estimator, uint8_t spring)
 {
-    return estimator->spring[spring].learnt.austenite_ohm > 0.0f && estimator->observes;
+    const spring_belief_t *const belief = &estimator->spring[spring];
+    return belief->untested && belief->learnt.austenite_ohm > 0.0f && estimator->observes;
 }
 /* The heating has fully transformed it: seen, or as hot as it takes whatever it reads. */
 bool spring_estimator_has_transformed(const spring_estimator_t *estimator,

@@ -202,7 +202,7 @@ static void take_another_circuit(spring_estimator_t *e, spring_belief_t *b,
 {
     const float own_ohm = spring_martensite_ohm(b, model, k);
     const float step_ohm = b->ohm - own_ohm;
-    if (b->told || own_ohm <= 0.0f || fabsf(step_ohm) <= ANOTHER_CIRCUIT * own_ohm) {
+    if (b->untested || own_ohm <= 0.0f || fabsf(step_ohm) <= ANOTHER_CIRCUIT * own_ohm) {
         return;
     }
     const spring_before_t before = spring_before(b, model, k);

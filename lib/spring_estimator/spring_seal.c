@@ -40,6 +40,7 @@ void spring_begin_shared(spring_estimator_t *e)
     spring_begin_alloy(e);
     e->stepped_turns = 0;
     e->stepped_spring = 0;
+    e->doubtful = true; /* where it turned over by itself; who begins says what it is */
     e->sights.turn = 0;
     e->sights.count = 0; /* whoever has been told of some goes on by their numbers */
 }

@@ -121,6 +121,9 @@ struct rerun::board {
         }
         (void)controller_set_fan(&controller,
                                  static_cast<std::uint8_t>(number(field(text, 2), "fan")));
+        if (number(field(text, 3), "warm") != 0) {
+            controller_doubt_cold(&controller);
+        }
         (void)controller_restart(&controller, &settings.controller);
         telemetry_init(&telemetry);
         console_init(&console, &output, &controller, &settings, &store, &learnt_store, &telemetry,

@@ -247,6 +247,54 @@ TEST(a_sensor_that_shows_a_fifth_too_little_overheats_nothing)
     TEST_ASSERT_TRUE(run(300.0) < HOTTEST_C);
 }
 
+/* Power goes and comes back, and what was learnt is told anew: of springs that it may have left
+ * warm, or of cold ones. */
+static void cut_power(double seconds, bool warm)
+{
+    controller_t *const controller = loop_controller(loop);
+    spring_learnt_t learnt[SPRINGS];
+    for (uint8_t k = 0; k < SPRINGS; k++) {
+        want(k, 0);
+        learnt[k] = controller_to_keep(controller, k);
+    }
+    loop_advance(loop, seconds);
+    TEST_ASSERT_TRUE(controller_init(controller, &settings, 20 * 128, NULL));
+    for (uint8_t k = 0; k < SPRINGS; k++) {
+        controller_restore_learnt(controller, k, &learnt[k]);
+    }
+    if (warm) {
+        controller_doubt_cold(controller);
+    }
+}
+
+/* A plug that falls out takes a crimp along, or a sensor is exchanged: hot austenite then reads as
+ * its martensite did (175 degC, were that believed), and cold martensite as its austenite (shown as
+ * on for minutes). Neither is believed; what did not change is held at once. */
+TEST(a_circuit_that_another_one_is_since_the_power_went_tells_no_phase)
+{
+    static const struct {
+        double before, after, off_s;
+        bool warm;
+    } table[] = {{0.8, 1.0, 1.0, true}, {0.9, 1.0, 1.0, true}, {1.0, 0.8, 300.0, false}};
+    for (size_t n = 0; n < sizeof table / sizeof table[0]; n++) {
+        row(n);
+        plant_reset(plant);
+        power_on();
+        TEST_ASSERT_TRUE(loop_scale_sensor(loop, 0, table[n].before, 1.0));
+        want_all_but(CENTRE);
+        TEST_ASSERT_TRUE(run(300.0) < HOTTEST_C);
+        cut_power(table[n].off_s, table[n].warm);
+        TEST_ASSERT_TRUE(loop_scale_sensor(loop, 0, table[n].after, 1.0));
+        want_all_but(CENTRE);
+        TEST_ASSERT_TRUE(run(15.0) < HOTTEST_C);
+        TEST_ASSERT_EQUAL(table[n].warm, phase(1) > 0.98);
+        TEST_ASSERT_TRUE(limited_by(0, DRIVE_POLICY_LIMIT_COOLING) ||
+                         fault(0) != SAFETY_FAULT_NONE);
+        TEST_ASSERT_TRUE(run(105.0) < HOTTEST_C);
+        TEST_ASSERT_TRUE(phase(0) > 0.98 || fault(0) != SAFETY_FAULT_NONE);
+    }
+}
+
 /* Neither sign nor size of the declared change is believed: what is seen is learnt. */
 TEST(change_of_resistance_is_learnt_whatever_is_declared)
 {

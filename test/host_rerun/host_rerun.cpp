@@ -175,14 +175,16 @@ TEST(the_same_day_again_is_believed_to_the_last_bit)
     TEST_ASSERT_EQUAL_MEMORY(seen.sight, controller_sights(&is)->sight, sizeof seen.sight);
 }
 
-/* It begins in mid-life: what was learnt is on it. */
+/* It begins in mid-life: what was learnt is on it, and that springs may be warm. */
 TEST(a_tape_begins_with_what_was_learnt)
 {
     recorder board(4);
     board.type("model cold");
     live(board);
     board.type("clear"); /* the silent sensor's fault */
-    board.run(1.0);
+    board.type("on 4");
+    board.run(16.0);
+    board.type("off all");
     const spring_learnt_t learnt = controller_learnt(board.controller(), 3);
     TEST_ASSERT_TRUE(learnt.austenite_ohm > 0.1f);
     board.begin();
@@ -199,6 +201,7 @@ TEST(a_tape_begins_with_what_was_learnt)
     TEST_ASSERT_EQUAL_UINT64(0, again.so_far().other);
     TEST_ASSERT_TRUE(again.so_far().marks > 1000u);
     TEST_ASSERT_NOT_NULL(std::strstr(again.ask("why 4").c_str(), "its phase is read"));
+    TEST_ASSERT_EQUAL_UINT8(DRIVE_POLICY_STAGE_HOLD, controller_stage(again.controller(), 3));
     TEST_ASSERT_EQUAL_STRING("ok\r\n", again.ask("faults").c_str());
 }
 

@@ -67,7 +67,7 @@ def test_a_board_with_a_spring_on_gives_no_tape_and_says_why(tmp_path: Path) -> 
 
 
 def test_ticks_that_are_lost_on_the_way_are_said(tmp_path: Path) -> None:
-    board = FakeBoard({"telemetry inputs": ["<start|ambient_c7:2560|fan:0>", "ok"]})
+    board = FakeBoard({"telemetry inputs": ["<start|ambient_c7:2560|fan:0|warm:0>", "ok"]})
     tape = tmp_path / "day.tape"
     numbers = [0xFFFE, 0xFFFF, 0, 1, 5, 6, 9, *range(10, 200)]
     lines = [f"~S{number:04X}0A00" for number in numbers]
@@ -80,7 +80,7 @@ def test_ticks_that_are_lost_on_the_way_are_said(tmp_path: Path) -> None:
 
 
 def test_what_is_no_tape_does_not_go_on_for_ever(tmp_path: Path) -> None:
-    board = FakeBoard({"telemetry inputs": ["<start|ambient_c7:2560|fan:0>", "ok"]})
+    board = FakeBoard({"telemetry inputs": ["<start|ambient_c7:2560|fan:0|warm:0>", "ok"]})
     threading.Timer(1.5, lambda: board.say("~S00010A00", *[row(1.0)] * 260)).start()
     got = run("record", "--port", board.port, "--tape", "--duration", "1", "-o", tmp_path / "day.tape")
     assert got.returncode == 1

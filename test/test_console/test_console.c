@@ -893,7 +893,7 @@ TEST(inputs_begin_anew_with_what_was_learnt)
     TEST_ASSERT_EQUAL_FLOAT(0.0f, controller_cooling_s(&controller, 0));
     expect_ok("telemetry inputs");
     expect_said("<learnt|spring:9|8941603E"); /* 0.219 as it lies in RAM */
-    expect_said(">\r\n<start|ambient_c7:2560|fan:30>\r\nok\r\n");
+    expect_said(">\r\n<start|ambient_c7:2560|fan:30|warm:0>\r\nok\r\n");
     TEST_ASSERT_EQUAL_UINT8(TELEMETRY_INPUTS, telemetry.format);
     TEST_ASSERT_TRUE(controller_cooling_s(&controller, 0) > 30.0f);
     TEST_ASSERT_EQUAL_UINT8(30, controller_fan_percent(&controller));

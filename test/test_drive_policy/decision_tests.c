@@ -341,17 +341,19 @@ TEST(heating_slows_to_a_level_and_keeps_what_waits)
     TEST_ASSERT_EQUAL_UINT16(BOOST_MA, policy.spring[0].wanted_ma);
 }
 
-/* Nothing is known: it waits and says so, or looks with 2 A, where its own numbers would tell:
- * from its first turn on, whether it is asked for just now or heats already. */
+/* Nothing is known: it waits and says so, or looks with 2 A, where its own numbers would tell and
+ * have not been asked: from its first turn on, whether it is asked for just now or heats already.
+ */
 TEST(what_is_not_known_waits_or_looks)
 {
-    for (unsigned i = 0; i < 6; i++) {
-        const unsigned n = i % 3;
+    for (unsigned i = 0; i < 8; i++) {
+        const unsigned n = i % 4;
         begin(1, 2);
         believed(0, 70.0f, SPRING_PHASE_ANY, 1.0f);
         of(0)->learnt.austenite_ohm = n == 1 ? 0.0f : 0.25f;
+        of(0)->untested = n != 3;
         spring_estimator_prepare(&belief, &model, n != 2);
-        stands(0, i < 3 ? HEAT : OFF, 1000);
+        stands(0, i < 4 ? HEAT : OFF, 1000);
         turn_of(0);
         TEST_ASSERT_EQUAL_UINT16(n == 0 ? 2000 : 0, target_ma[0]);
         TEST_ASSERT_EQUAL(n != 0,

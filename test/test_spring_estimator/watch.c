@@ -588,7 +588,7 @@ TEST(martensite_that_reads_otherwise_than_its_own_is_of_another_circuit)
     for (size_t n = 0; n < ROWS(table); n++) {
         begin_heating_at(30.0, table[n].possible, 5.0);
         row(n);
-        INSIDE.told = table[n].told;
+        INSIDE.untested = table[n].told;
         INSIDE.ohm = (float)table[n].ohm;
         INSIDE.learnt.martensite_ohm = (float)table[n].was_ohm;
         INSIDE.learnt.martensite_rise_per_k = 0.0f;
