@@ -172,6 +172,26 @@ static void start(controller_t *controller, const controller_settings_t *setting
     scrub_start(&controller->scrub, controller_fixed, controller);
 }
 
+/* In mid-life: what is latched stays, also of springs that another size has not for a while. */
+static void start_anew(controller_t *controller, const controller_settings_t *settings,
+                       bool keeps_learnt)
+{
+    const uint8_t board_fault = controller->safety.board_fault;
+    const bool locked = controller->safety.locked;
+    const uint8_t fan_percent = controller->fan_percent;
+    uint8_t fault[CONTROLLER_MAX_SPRINGS];
+    for (uint8_t k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
+        fault[k] = controller->safety.spring[k].fault;
+    }
+    start(controller, settings, controller->ambient_c7, keeps_learnt);
+    controller->safety.board_fault = board_fault;
+    controller->safety.locked = locked;
+    controller->fan_percent = fan_percent;
+    for (uint8_t k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
+        controller->safety.spring[k].fault = fault[k];
+    }
+}
+
 bool controller_init(controller_t *controller, const controller_settings_t *settings,
                      int16_t ambient_c7, uint16_t *bad)
 {
@@ -184,6 +204,7 @@ bool controller_init(controller_t *controller, const controller_settings_t *sett
     temperature_ceiling_begin(&controller->ceiling, ambient_c7);
     controller->supply_off = false;
     controller->supply_ticks = 0;
+    memset(controller->mistrusted, 0, sizeof controller->mistrusted);
     start(controller, settings, ambient_c7, false);
     return true;
 }
@@ -270,13 +291,7 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
     if (!init_model(&controller->model, &settings->model, bad)) {
         return false;
     }
-    uint8_t board_fault = controller->safety.board_fault;
-    bool locked = controller->safety.locked;
-    uint8_t fan_percent = controller->fan_percent;
-    start(controller, settings, controller->ambient_c7, false);
-    controller->safety.board_fault = board_fault;
-    controller->safety.locked = locked;
-    controller->fan_percent = fan_percent;
+    start_anew(controller, settings, false);
     return true;
 }
 
@@ -286,11 +301,9 @@ bool controller_restart(controller_t *controller, const controller_settings_t *s
     if (!controller_is_sound(controller)) {
         return false;
     }
-    const uint8_t fan_percent = controller->fan_percent;
     thermal_model_set_fan(&controller->model, 0); /* as it is initialised; the next step tells */
     controller->supply_ticks = 0;
-    start(controller, settings, controller->ambient_c7, true);
-    controller->fan_percent = fan_percent;
+    start_anew(controller, settings, true);
     return true;
 }
 

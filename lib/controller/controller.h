@@ -68,8 +68,10 @@ typedef struct {
     thermal_model_t model;
     temperature_ceiling_t ceiling;
     temperature_ceiling_drive_t drive;
-    bool supply_off;           /* until controller_set_supply */
-    uint8_t supply_ticks;      /* that the supply has been held, up to those that a relay takes */
+    bool supply_off;      /* until controller_set_supply */
+    uint8_t supply_ticks; /* that the supply has been held, up to those that a relay takes */
+    /* a bit a spring: it had SAFETY_FAULT_SENSOR_MISMATCH or _STUCK_ON, cleared since */
+    uint8_t mistrusted[(CONTROLLER_MAX_SPRINGS + 7) / 8];
     current_control_t current; /* what is before it outlives another size of the array */
     safety_t safety;
     spring_estimator_t estimator; /* what is believed; it alone corrects the model */
@@ -89,8 +91,6 @@ typedef struct {
     circuit_peers_t peers;
     circuit_source_t source;
     circuit_step_t step[CONTROLLER_MAX_SPRINGS];
-    /* a bit a spring: it had SAFETY_FAULT_SENSOR_MISMATCH or _STUCK_ON, cleared since */
-    uint8_t mistrusted[(CONTROLLER_MAX_SPRINGS + 7) / 8];
     uint32_t heat_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the ceiling's running step */
     uint16_t duty_sum[CONTROLLER_MAX_SPRINGS];    /* the same */
     scrub_t scrub;                                /* of what settings decide */

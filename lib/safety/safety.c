@@ -340,7 +340,7 @@ void safety_clear(safety_t *safety)
     safety->board_fault = SAFETY_FAULT_NONE;
     safety->supply_count = 0;
     safety->blind = 0;
-    for (uint8_t k = 0; k < SAFETY_MAX_SPRINGS; k++) {
+    for (uint8_t k = 0; k < safety->springs; k++) {
         const int16_t frozen_ma = safety->spring[k].frozen_ma;
         safety->spring[k] = (safety_spring_t){.frozen_ma = frozen_ma};
     }

@@ -837,6 +837,8 @@ TEST(another_size_starts_anew_but_stays_locked)
     run(500);
     controller_lock(&controller);
     controller_emergency_stop(&controller);
+    safety_trip(&controller.safety, 1, SAFETY_FAULT_SENSOR_MISMATCH);
+    safety_trip(&controller.safety, 8, SAFETY_FAULT_SENSOR_MISMATCH);
     settings.model.rows = 1;
     settings.model.columns = 2;
     TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
@@ -846,12 +848,21 @@ TEST(another_size_starts_anew_but_stays_locked)
     run(1);
     TEST_ASSERT_TRUE(all_off());
     TEST_ASSERT_FALSE(controller_set_target(&controller, 2, 1000));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, controller_fault(&controller, 1));
     controller_unlock(&controller);
     controller_clear_faults(&controller);
     all_on();
     run(100);
     TEST_ASSERT_INT_WITHIN(30, 1500, controller_measured_ma(&controller, 1));
     TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[2]);
+    settings.model.rows = 3; /* nor is what was latched, or cleared once, forgotten by it */
+    settings.model.columns = 3;
+    TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, controller_fault(&controller, 8));
+    safety_trip(&controller.safety, 1, SAFETY_FAULT_SENSOR_MISMATCH);
+    controller_clear_faults(&controller);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, controller_fault(&controller, 1));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 8));
 }
 
 /* ---- RAM that turns over ---- */
