@@ -164,7 +164,7 @@ static void start(controller_t *controller, const controller_settings_t *setting
     (void)safety_init(&controller->safety, &settings->safety, controller->springs, NULL);
     spring_estimator_restart(&controller->estimator, model);
     if (controller->ceiling.delivered || controller->ceiling.doubtful) {
-        controller_doubt_cold(controller);
+        spring_estimator_doubt(&controller->estimator);
     }
     (void)drive_policy_init(&controller->policy, &settings->policy, model, NULL);
     spring_estimator_prepare(&controller->estimator, model, settings->policy.observer != 0);

@@ -121,10 +121,10 @@ struct rerun::board {
         }
         (void)controller_set_fan(&controller,
                                  static_cast<std::uint8_t>(number(field(text, 2), "fan")));
-        if (number(field(text, 3), "warm") != 0) {
-            controller_doubt_cold(&controller);
-        }
         (void)controller_restart(&controller, &settings.controller);
+        if (number(field(text, 3), "warm") != 0) {
+            spring_estimator_doubt(&controller.estimator);
+        }
         telemetry_init(&telemetry);
         console_init(&console, &output, &controller, &settings, &store, &learnt_store, &telemetry,
                      &status);
