@@ -251,6 +251,36 @@ static bool declare(controller_t *controller, const thermal_model_parameters_t *
     return true;
 }
 
+static uint8_t bit_of(uint8_t spring)
+{
+    return (uint8_t)(1u << (spring & 7u));
+}
+
+static bool is_mistrusted(const controller_t *controller, uint8_t spring)
+{
+    return (controller->mistrusted[spring / 8u] & bit_of(spring)) != 0;
+}
+
+static bool is_same_circuit(const current_control_parameters_t *a,
+                            const current_control_parameters_t *b)
+{
+    return a->supply_mv == b->supply_mv && a->freewheel_mv == b->freewheel_mv &&
+           a->shunt_mohm == b->shunt_mohm && a->wiring_mohm == b->wiring_mohm;
+}
+
+/* What springs showed was shown by what was declared until now. Of one that had lied that told of
+ * it: it is believed once it has rested, as after a reset. */
+static void begin_circuit(controller_t *controller, const current_control_parameters_t *circuit)
+{
+    controller->peers = (circuit_peers_t){0};
+    circuit_source_begin(&controller->source, circuit);
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        if (is_mistrusted(controller, k)) {
+            controller_mistrust(controller, k);
+        }
+    }
+}
+
 bool controller_apply_settings(controller_t *controller, const controller_settings_t *settings,
                                uint16_t *bad)
 {
@@ -268,9 +298,9 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
             return false;
         }
         if ((other & CURRENT_PART) != 0) {
-            controller->peers = (circuit_peers_t){0}; /* it is another circuit */
-            circuit_source_begin(&controller->source, &settings->current);
-            memset(controller->mistrusted, 0, sizeof controller->mistrusted);
+            if (!is_same_circuit(&controller->current.parameters, &settings->current)) {
+                begin_circuit(controller, &settings->current);
+            }
             (void)current_control_apply(&controller->current, &settings->current, NULL);
             current_control_set_drop(&controller->current, controller->source.driven_drop_mv);
         }
@@ -690,11 +720,6 @@ void controller_host_heard(controller_t *controller)
     controller->silent_ticks = 0;
 }
 
-static uint8_t bit_of(uint8_t spring)
-{
-    return (uint8_t)(1u << (spring & 7u));
-}
-
 /* What a clear may not end at once a second time: as long as its cause stays, each time heats. */
 static bool heats_when_cleared(safety_fault_t fault)
 {
@@ -704,7 +729,7 @@ static bool heats_when_cleared(safety_fault_t fault)
 uint16_t controller_clear_wait_s(const controller_t *controller, uint8_t spring)
 {
     const thermal_model_parameters_t *const p = &controller->model.parameters;
-    if ((controller->mistrusted[spring / 8u] & bit_of(spring)) == 0 ||
+    if (!is_mistrusted(controller, spring) ||
         !heats_when_cleared(safety_fault(&controller->safety, spring))) {
         return 0;
     }
