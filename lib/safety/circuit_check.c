@@ -68,8 +68,10 @@ void circuit_check_take(circuit_check_t *c, uint16_t fixed_mohm, uint8_t dead_st
                         bool valid, int16_t current_ma, int16_t voltage_mv)
 {
     const uint16_t moved = (uint16_t)(duty - c->last_duty + CIRCUIT_CHECK_JUMP);
+    const bool late = c->late;
     c->last_duty = duty;
-    if (!valid || moved > 2u * CIRCUIT_CHECK_JUMP || !is_of_one_kind(c, dead_steps, duty)) {
+    c->late = false;
+    if (!valid || late || moved > 2u * CIRCUIT_CHECK_JUMP || !is_of_one_kind(c, dead_steps, duty)) {
         return;
     }
     const uint16_t dropped_mv = (uint16_t)(((uint32_t)amount(current_ma) * fixed_mohm) >>
@@ -91,7 +93,7 @@ void circuit_check_take(circuit_check_t *c, uint16_t fixed_mohm, uint8_t dead_st
 
 bool circuit_check_drop(circuit_check_t *c)
 {
-    if (!c->hurried) {
+    if (!c->hurried || c->readings >= LEAST_READINGS) {
         return false;
     }
     *c = begun(c);

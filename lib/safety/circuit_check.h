@@ -39,6 +39,7 @@ typedef struct {
     uint8_t unbalanced : 4; /* windows on end in which it was not what the duty should bring */
     uint8_t restless : 4;   /* windows on end in which it moved without the duty */
     bool hurried : 1;       /* a tick of this window was not 20 ms after the one before */
+    bool late : 1;          /* and it is the next one of which a reading comes */
 } circuit_check_t;
 
 /* The last window was one of a circuit. */
@@ -74,14 +75,15 @@ static inline bool circuit_window_compares(const circuit_window_t *window)
     return window->tells && window->expected_mv >= CIRCUIT_WINDOW_LEAST_MV;
 }
 
-/* A tick that came late, or soon after a late one: what is read at its end is of another duty. */
+/* A tick that came late, or soon after a late one: what is read at its end is of another duty, and
+ * is left out. */
 static inline void circuit_check_hurry(circuit_check_t *check)
 {
-    check->hurried = true;
+    check->hurried = check->late = true;
 }
 
-/* Ends a window of which nothing is to be judged, as one tick was hurried: neither sound nor odd,
- * it ends no row. False, nothing changed, if none was. */
+/* Ends a window of which nothing is to be judged, as hurried ticks left few readings: neither sound
+ * nor odd, it ends no row. False, nothing changed, if it had enough, or none was hurried. */
 bool circuit_check_drop(circuit_check_t *check);
 
 /* One tick: the duty (steps of 800) that was applied in it and, if valid, what was read at its end.

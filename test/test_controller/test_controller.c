@@ -554,10 +554,20 @@ TEST(contact_that_is_not_there_is_no_circuit)
     }
 }
 
-/* Of a window in which a tick was hurried nothing is judged, and it ends no row of those before. */
-TEST(window_of_a_hurried_tick_is_left_out)
+/* What is read of a hurried tick is left out. Of a window of such nothing is judged, and it ends no
+ * row of those before; one in which a host types settings all the time tells as any other. */
+TEST(readings_of_hurried_ticks_are_left_out)
 {
-    for (unsigned hurried = 0; hurried < 2; hurried++) {
+    static const struct {
+        uint32_t every; /* so many ticks one is hurried */
+        bool lies_then; /* and no other */
+        uint8_t unbalanced;
+        safety_fault_t fault;
+    } table[] = {{UINT32_MAX, false, CIRCUIT_CHECK_BALANCE_WINDOWS, SAFETY_FAULT_SENSOR_MISMATCH},
+                 {1, false, CIRCUIT_CHECK_BALANCE_WINDOWS - 1u, SAFETY_FAULT_NONE},
+                 {6, false, CIRCUIT_CHECK_BALANCE_WINDOWS, SAFETY_FAULT_SENSOR_MISMATCH},
+                 {6, true, 0, SAFETY_FAULT_NONE}};
+    for (size_t n = 0; n < sizeof table / sizeof table[0]; n++) {
         setUp();
         heat_for_4_s();
         while (controller.circuit[4].readings != 0) {
@@ -565,20 +575,22 @@ TEST(window_of_a_hurried_tick_is_left_out)
         }
         controller.circuit[4].unbalanced = CIRCUIT_CHECK_BALANCE_WINDOWS - 1u;
         const circuit_peer_t peer = controller.peers.spring[4];
-        for (unsigned tick = 0; tick < CIRCUIT_CHECK_TICKS; tick++) {
-            inputs.sensor[4].voltage_mv = (int16_t)(2 * inputs.sensor[4].voltage_mv);
-            if (hurried != 0) {
+        for (uint32_t tick = 1; tick <= CIRCUIT_CHECK_TICKS; tick++) {
+            const bool hurried = tick % table[n].every == 0;
+            if (hurried || !table[n].lies_then) {
+                inputs.sensor[4].voltage_mv = (int16_t)(2 * inputs.sensor[4].voltage_mv);
+            }
+            if (hurried) {
                 controller_hurry(&controller);
             }
             run(1);
         }
-        TEST_ASSERT_EQUAL(hurried != 0 ? CIRCUIT_CHECK_BALANCE_WINDOWS - 1u
-                                       : CIRCUIT_CHECK_BALANCE_WINDOWS,
-                          controller.circuit[4].unbalanced);
-        TEST_ASSERT_EQUAL(hurried != 0 ? SAFETY_FAULT_NONE : SAFETY_FAULT_SENSOR_MISMATCH,
-                          controller_fault(&controller, 4));
-        TEST_ASSERT_EQUAL(hurried != 0,
-                          memcmp(&peer, &controller.peers.spring[4], sizeof peer) == 0);
+        row(n);
+        TEST_ASSERT_EQUAL_UINT8(table[n].unbalanced, controller.circuit[4].unbalanced);
+        TEST_ASSERT_EQUAL(table[n].fault, controller_fault(&controller, 4));
+        if (table[n].every == 1) {
+            TEST_ASSERT_EQUAL_MEMORY(&peer, &controller.peers.spring[4], sizeof peer);
+        }
     }
 }
 
