@@ -24,6 +24,12 @@ static inline void turn_inside(spring_estimator_t *estimator, uint8_t turn)
     estimator->last_turn = turn;
 }
 
+/* Whether what springs read is taken to be of springs that may be hot. */
+static inline bool doubts_inside(const spring_estimator_t *estimator)
+{
+    return estimator->doubtful;
+}
+
 static inline spring_sights_t *sights_inside(spring_estimator_t *estimator)
 {
     return &estimator->sights;

@@ -323,7 +323,7 @@ TEST(what_was_warm_as_the_power_was_cut_is_called_cold_by_nobody)
     for (int heated = 0; heated < 2; heated++) { /* what it reads is, once heat was given */
         settings.model.rows = (uint8_t)(2 + heated);
         TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
-        TEST_ASSERT_EQUAL(heated, controller.estimator.doubtful);
+        TEST_ASSERT_EQUAL(heated, doubts_inside(&controller.estimator));
         controller_set_temperature(&controller, AMBIENT_C7);
         all_on();
         run(50u);
