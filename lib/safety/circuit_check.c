@@ -68,10 +68,12 @@ void circuit_check_take(circuit_check_t *c, uint16_t fixed_mohm, uint8_t dead_st
                         bool valid, int16_t current_ma, int16_t voltage_mv)
 {
     const uint16_t moved = (uint16_t)(duty - c->last_duty + CIRCUIT_CHECK_JUMP);
-    const bool late = c->late;
     c->last_duty = duty;
-    c->late = false;
-    if (!valid || late || moved > 2u * CIRCUIT_CHECK_JUMP || !is_of_one_kind(c, dead_steps, duty)) {
+    if (c->late) {
+        c->late = false;
+        return;
+    }
+    if (!valid || moved > 2u * CIRCUIT_CHECK_JUMP || !is_of_one_kind(c, dead_steps, duty)) {
         return;
     }
     const uint16_t dropped_mv = (uint16_t)(((uint32_t)amount(current_ma) * fixed_mohm) >>
@@ -167,18 +169,19 @@ bool circuit_check_judge(circuit_check_t *c, const circuit_source_t *source, uin
         const float off_mv = found_mv - declared_mv;
         const float beyond_mv = fabsf(off_mv) - BALANCE_SHARE * declared_mv - BALANCE_MV;
         unbalanced = beyond_mv > (off_mv < 0.0f ? source->more_mv : source->less_mv);
+        const bool steady = variance < STEADY_SHARE * STEADY_SHARE * duty * duty;
         const float square_mv2 = share * (float)c->voltage_square;
-        restless = moves_alone(square_mv2 - found_mv * found_mv, follows_mv, variance, found_mv);
+        restless = flows && steady &&
+                   moves_alone(square_mv2 - found_mv * found_mv, follows_mv, variance, found_mv);
         if (window != NULL) {
-            *window =
-                (circuit_window_t){.found_mv = found_mv,
-                                   .expected_mv = expected_mv,
-                                   .share = circuit_window_share(found_mv, expected_mv),
-                                   .current_ma = 2.0f * share * (float)c->current_2ma,
-                                   .duty = duty,
-                                   .steady = variance < STEADY_SHARE * STEADY_SHARE * duty * duty,
-                                   .tells = true,
-                                   .balances = beyond_mv <= 0.0f};
+            *window = (circuit_window_t){.found_mv = found_mv,
+                                         .expected_mv = expected_mv,
+                                         .share = circuit_window_share(found_mv, expected_mv),
+                                         .current_ma = 2.0f * share * (float)c->current_2ma,
+                                         .duty = duty,
+                                         .steady = steady,
+                                         .tells = true,
+                                         .balances = beyond_mv <= 0.0f};
         }
     }
     c->astray = counted(c->astray, astray) & 15u;

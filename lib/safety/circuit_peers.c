@@ -183,6 +183,8 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
         if (!odd && (good || !was_found(own)) && own->learnt < LEARN_MOST && teaches) {
             learn(own, share / others, told_mv / VOLTS_MV);
         }
+    } else if (own->was_q7 != 0 && expected_mv < source->unsure_mv) {
+        return own->odd >= CIRCUIT_PEERS_WINDOWS; /* the drop may take all of it */
     } else if (own->was_q7 != 0) {
         const float was = (float)own->was_q7 / SHARE_Q7;
         const float part = own->odd >= CIRCUIT_PEERS_WINDOWS - 1u ? KNOWN_PART : ALONE_PART;

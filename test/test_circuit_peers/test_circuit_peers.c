@@ -252,6 +252,26 @@ TEST(what_one_that_was_found_showed_before_is_told_by_another_belief)
     }
 }
 
+/* Heated, and then held where all that its duty brings may be the drop: 35 mV of 150. */
+TEST(one_alone_is_not_judged_where_the_drop_may_take_all)
+{
+    for (unsigned tells = 0; tells < 2; tells++) {
+        setUp();
+        TEST_ASSERT_EQUAL_HEX(0, rounds(3, 1, HEATS_MV, 1.0f, 0.0f));
+        source.unsure_mv = tells != 0 ? 149.0f : 151.0f;
+        bool found = false;
+        for (unsigned n = 0; n < CIRCUIT_PEERS_WINDOWS; n++) {
+            found = takes(0, 150.0f, 0.23f);
+        }
+        TEST_ASSERT_EQUAL(tells, found);
+        found = false;
+        for (unsigned n = 0; n < CIRCUIT_PEERS_WINDOWS; n++) {
+            found = takes(0, HEATS_MV, 0.7f); /* it is known still what it showed */
+        }
+        TEST_ASSERT_TRUE(found);
+    }
+}
+
 /* But it ends a row that is not full. */
 TEST(what_may_be_the_drop_is_not_odd)
 {
