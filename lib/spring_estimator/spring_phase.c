@@ -1,3 +1,5 @@
+#include <math.h>
+
 #include "spring_estimator_internal.h"
 
 #define PHASE_SD      0.03f /* a hundredth of holds that show no loss have lost 8 % or more */
@@ -61,9 +63,9 @@ static float phase_sd(const spring_estimator_t *e, const thermal_model_t *model,
     case BY_LOSS:
         return spring_estimator_blind(b) ? UNIFORM_SD : PHASE_SD;
     case BY_RESISTANCE:
-        return PHASE_READ_SD;
+        return PHASE_READ_SD + b->noise / fabsf(b->learnt.change);
     case BY_MARTENSITE:
-        return LOOK_SD;
+        return LOOK_SD + b->noise / fabsf(b->learnt.change);
     case BY_MODEL:
         break;
     }

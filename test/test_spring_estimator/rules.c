@@ -413,15 +413,19 @@ TEST(phase_is_told_by_the_best_that_there_is)
         bool reads, blind;
         float austenite_ohm, martensite_ohm;
         float value, sd;
+        float noise;
     } table[] = {
-        {SPRING_PHASE_AUSTENITE, true, false, 0.22f, 0.176f, 0.9f, 0.03f}, /* by what was lost */
-        {SPRING_PHASE_AUSTENITE, true, true, 0.22f, 0.176f, 0.9f, 0.29f},
-        {SPRING_PHASE_BETWEEN, true, false, 0.22f, 0.176f, 0.5f, 0.08f},
-        {SPRING_PHASE_BETWEEN, true, false, 0.0f, 0.176f, 0.556f, 0.12f},
-        {SPRING_PHASE_BETWEEN, true, false, 0.0f, 0.15f, 1.0f, 0.12f},
-        {SPRING_PHASE_BETWEEN, true, false, 0.0f, 0.0f, 0.0f, 0.29f}, /* by the model: cold */
-        {SPRING_PHASE_BETWEEN, false, false, 0.22f, 0.176f, 0.0f, 0.29f},
-        {SPRING_PHASE_MARTENSITE, true, false, 0.22f, 0.176f, 0.0f, 0.03f},
+        {SPRING_PHASE_AUSTENITE, true, false, 0.22f, 0.176f, 0.9f, 0.03f,
+         0.0f}, /* by what was lost */
+        {SPRING_PHASE_AUSTENITE, true, true, 0.22f, 0.176f, 0.9f, 0.29f, 0.0f},
+        {SPRING_PHASE_BETWEEN, true, false, 0.22f, 0.176f, 0.5f, 0.08f, 0.0f},
+        {SPRING_PHASE_BETWEEN, true, false, 0.0f, 0.176f, 0.556f, 0.12f, 0.0f},
+        {SPRING_PHASE_BETWEEN, true, false, 0.22f, 0.176f, 0.5f, 0.13f, 0.01f}, /* of its change */
+        {SPRING_PHASE_BETWEEN, true, false, 0.0f, 0.176f, 0.556f, 0.14f, 0.004f},
+        {SPRING_PHASE_BETWEEN, true, false, 0.0f, 0.15f, 1.0f, 0.12f, 0.0f},
+        {SPRING_PHASE_BETWEEN, true, false, 0.0f, 0.0f, 0.0f, 0.29f, 0.0f}, /* by the model: cold */
+        {SPRING_PHASE_BETWEEN, false, false, 0.22f, 0.176f, 0.0f, 0.29f, 0.0f},
+        {SPRING_PHASE_MARTENSITE, true, false, 0.22f, 0.176f, 0.0f, 0.03f, 0.0f},
     };
     for (size_t n = 0; n < ROWS(table); n++) {
         begin_cold();
@@ -430,6 +434,7 @@ TEST(phase_is_told_by_the_best_that_there_is)
         INSIDE.reads = table[n].reads;
         INSIDE.blind = table[n].blind;
         INSIDE.lost = 0.1f;
+        INSIDE.noise = table[n].noise;
         INSIDE.phase_ohm = 0.198f;
         INSIDE.learnt = (spring_learnt_t){.austenite_ohm = table[n].austenite_ohm,
                                           .martensite_ohm = table[n].martensite_ohm,
