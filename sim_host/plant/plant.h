@@ -118,7 +118,7 @@ plant_status_t plant_set_ambient(plant_t *plant, double ambient_c);
 /* Advances by dt_s (0 < dt_s <= 1e7) with the drives held: Bogacki-Shampine 3(2) on the enthalpies,
  * step chosen so that the estimated error of one step stays below the parameter
  * integration_tolerance_c. With the default the result is within 0.01 degC of the exact one (held
- * by test/host_plant). */
+ * by test/host_plant). PLANT_ERROR_RANGE where a spring runs away: beyond 1e6 degC. */
 plant_status_t plant_step(plant_t *plant, double dt_s);
 /* Runs to the steady state of the present drives; PLANT_ERROR_TIME if it is not reached in limit_s.
  */
@@ -132,7 +132,8 @@ plant_status_t plant_settle(plant_t *plant, double limit_s);
  *   fan[rows], ambient_c[rows]  NULL or NaN keeps what is set
  *   measured_c[rows * n]    out, or NULL: what the sensors show
  *   temperature_c[rows * n] out, or NULL: what the springs have
- * Everything is checked first: on failure nothing moved and nothing was written. */
+ * Everything is checked first: on failure nothing moved and nothing was written, but where a spring
+ * runs away (plant_step). */
 plant_status_t plant_simulate(plant_t *plant, size_t rows, const double *time_s,
                               const plant_drive_mode_t *mode, const double *drive,
                               const double *fan, const double *ambient_c, double *measured_c,

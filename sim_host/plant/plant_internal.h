@@ -11,6 +11,7 @@
 #define COLDEST_C      (-60.0)
 #define HOTTEST_C      500.0
 #define LONGEST_STEP_S 1e7
+#define HOTTEST_NODE_C 1e6 /* far beyond all that stays a spring */
 
 /* ------------------------------------------------------------------- table */
 

@@ -92,6 +92,16 @@ static void accept(plant_t *p, double h)
         h * (2.0 / 9.0 * p->k[0].out_w + 1.0 / 3.0 * p->k[1].out_w + 4.0 / 9.0 * p->k[2].out_w);
 }
 
+/* Resistance that rises with temperature heats a spring the more the hotter it is. Steps would get
+ * ever shorter on the way to infinity. */
+static bool ran_away(const plant_t *p)
+{
+    for (int i = 0; i < p->n; i++)
+        if (!(fabs(p->temperature_c[i]) <= HOTTEST_NODE_C))
+            return true;
+    return false;
+}
+
 /* The last stage is the next step's first. */
 static void keep_last_flows(plant_t *p)
 {
@@ -157,6 +167,8 @@ plant_status_t plant_solver_advance(plant_t *p, double dt_s)
             continue; /* k[0] still holds */
         }
         accept(p, h);
+        if (ran_away(p))
+            return PLANT_ERROR_RANGE;
         keep_last_flows(p);
         /* a step cut short by the end says nothing against the longer one */
         if (!to_end || factor * h > p->step_s || error > 0.5 * tolerance)

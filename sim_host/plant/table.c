@@ -75,7 +75,7 @@ const char *plant_status_text(plant_status_t status)
     case PLANT_ERROR_NAME:
         return "no parameter or effect of that name";
     case PLANT_ERROR_RANGE:
-        return "value outside its limits, or not a number";
+        return "value outside its limits, or not a number, or a spring that runs away";
     case PLANT_ERROR_INDEX:
         return "no such spring";
     case PLANT_ERROR_SIZE:

@@ -171,6 +171,15 @@ TEST(transformation_temperatures_out_of_order_stop_the_step)
     OK(plant_step(plant, 1.0));
 }
 
+TEST(a_spring_that_runs_away_ends_the_simulation)
+{
+    on("resistance_temperature");
+    set("resistance_martensite_rise_per_k", 0.005);
+    set("resistance_austenite_rise_per_k", 0.005);
+    OK(plant_drive(plant, 0, PLANT_DRIVE_CURRENT, 20.0));
+    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE, plant_step(plant, 3600.0));
+}
+
 TEST(bad_drives_and_steps_are_refused)
 {
     static const double top[5] = {100, 20, 1, 1, 300}, bottom[5] = {-100, 0, 0, 0, -60};
