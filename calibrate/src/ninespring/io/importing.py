@@ -27,6 +27,8 @@ UNITS: dict[str, tuple[float, float]] = {
     "": (1.0, 0.0),
     "s": (1.0, 0.0),
     "ms": (1e-3, 0.0),
+    "us": (1e-6, 0.0),
+    "ns": (1e-9, 0.0),
     "min": (60.0, 0.0),
     "h": (3600.0, 0.0),
     "degC": (1.0, 0.0),
@@ -39,6 +41,9 @@ UNITS: dict[str, tuple[float, float]] = {
     "%": (0.01, 0.0),
 }
 """Factor and offset from a unit to the log's own."""
+
+SWITCH = {"true": "1", "on": "1", "false": "0", "off": "0"}
+"""How a logger may write whether a heater or a fan is on, in any case."""
 
 FINITE = 1e300
 MOST_PIXELS = 100_000
@@ -227,7 +232,7 @@ def _column(table: _Cells, name: str, rule: dict[str, Any], path: str | Path) ->
         stamps = pd.to_datetime(cells.where(~empty), errors="coerce", format=written, utc=True)
         values = (stamps - stamps.iloc[0]).dt.total_seconds()
     else:
-        plain = cells.str.replace(table.decimal, ".", regex=False)
+        plain = cells.str.replace(table.decimal, ".", regex=False).str.lower().replace(SWITCH)
         values = pd.to_numeric(plain.where(~empty), errors="coerce").replace([math.inf, -math.inf], math.nan)
     bad = np.flatnonzero((values.isna() & (~empty | (name == "time_s"))).to_numpy())
     if bad.size:
