@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from ninespring.infer import room
 from ninespring.infer.likelihood import BROKEN, Colour, Rows, Weighed, fitted
+from ninespring.infer.predict import in_its_room
 from ninespring.io import statistics
 from ninespring.io.logs.run import Run
 from ninespring.model import native
+from ninespring.model.models import Array, Model
 from ninespring.model.simulate import simulate_run
 
 
@@ -294,6 +296,19 @@ def test_a_fit_looks_for_a_room_where_its_run_began_or_where_others_were() -> No
     assert bounds[:2] == [pytest.approx((at - 2.0, at + 2.0), abs=0.01) for at in (18.0, 24.0)]
     assert bounds[2] == pytest.approx((12.0, 30.0), abs=0.01)
     assert room.believed(runs[:1]) == [(-math.inf, math.inf)]
+
+
+def test_a_room_that_was_beside_its_log_is_so_in_another_run() -> None:
+    fitted_k = {"ambient_offset_k@1": 2.0, "ambient_offset_k@2": 3.0, "run_sensor_offset_k@1": 0.5, "ambient_c@3": 20.0}
+    assert room.over_logged_k(fitted_k) == pytest.approx(3.0)
+    assert room.over_logged_k({"ambient_c@1": 20.0}) is None
+    model = Model(Array(1, 1))
+    model.provenance = {"room_over_logged_k": 2.5}
+    run = replace(one_run(23.0, 23.0), ambient_c=np.full(120, 20.0))
+    there = in_its_room(model, run)
+    assert there.ambient_c is not None and np.all(there.ambient_c == 22.5)
+    assert "2.5 K warmer than ambient_c" in there.notes[-1] and in_its_room(model, there) is there
+    assert in_its_room(Model(Array(1, 1)), run) is run
 
 
 def test_what_a_room_explains_is_taken_out_as_far_as_it_is_unknown() -> None:

@@ -120,7 +120,7 @@ def _print_diagnosis(told: results.Diagnosis, verdict: str) -> None:
                 "yes" if one.on_chip else "no",
             )
         out.print(table)
-    lines = [f"{one.text} Its own in each run: not in model.toml." for one in told.runs_differ]
+    lines = [one.text for one in told.runs_differ]
     lines += [
         f"{one.instead_of} or {one.name}: these data cannot tell. {one.separating_experiment}" for one in told.rivals
     ]

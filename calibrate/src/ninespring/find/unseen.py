@@ -154,7 +154,7 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, n
         return (run.temperature_c - simulate_run(plant.copy(), run, ambient))[split.counts]
 
     if run.ambient_c is not None:
-        off = off_in(run.ambient_c)
+        off = off_in(run.ambient_c + (room.over_logged_k(values) or 0.0))
         return off, off
     told, sigma = _room(problem, run, values, plant)
     ambient = np.full(len(run.time_s), told)

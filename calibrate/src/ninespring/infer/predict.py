@@ -41,17 +41,27 @@ def chip_lines(model: Model) -> tuple[str, str]:
 
 
 def in_its_room(model: Model, run: Run) -> Run:
-    """Return a run without an ambient with the one that its first minute tells, and say so; others as they are."""
-    if run.ambient_c is not None or room.begun(run) is None:
+    """Return a run without an ambient with the one that its first minute tells, one whose room is not where it was logged
+    with where it is, and say so; others as they are."""
+    known = model.provenance
+    if run.ambient_c is not None:
+        over_k = known.get("room_over_logged_k", 0.0)
+        if run.room_told or not over_k:
+            return run
+        said = (
+            f"what springs lose heat to is taken to be {abs(over_k):.1f} K {'warmer' if over_k > 0 else 'colder'} than "
+            "ambient_c says, as it was in what the model was fitted to"
+        )
+        return replace(run, ambient_c=run.ambient_c + over_k, notes=[*run.notes, said], room_told=True)
+    if room.begun(run) is None:
         return run
     plant = plant_of(model)
-    known = model.provenance
     over = known.get("room_over_first_k"), known.get("room_over_first_sigma_k")
     spread_k, misses_k = known.get("room_spread_k", room.ROOMS_K), known.get("room_first_minute_misses_k", 0.0)
     told = room.Rooms(plant.get("ambient_c"), spread_k, None if None in over else over, misses_k)
     value, sigma = told.told(run, plant)
     said = f"no ambient_c: by the first minute the room is at {value:.1f} degC (+-{sigma:.1f})"
-    return replace(run, ambient_c=np.full(len(run.time_s), value), notes=[*run.notes, said])
+    return replace(run, ambient_c=np.full(len(run.time_s), value), notes=[*run.notes, said], room_told=True)
 
 
 def predict(model: Model, run: Run, chip: bool = False) -> np.ndarray:

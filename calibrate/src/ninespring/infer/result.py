@@ -94,6 +94,8 @@ def model_of(
         "rmse_after_c": statistics.rms(fit.residual),
         "hottest_c": max(float(np.nanmax(run.temperature_c)) for run in runs),
     }
+    if (over_k := room.over_logged_k(fit.as_dict())) is not None:
+        model.provenance["room_over_logged_k"] = over_k
     if rooms:
         told = room.Rooms.of([problem.runs[r] for r in rooms], constants, problem.plant_for(fit.spec, fit.values))
         model.provenance["room_spread_k"] = told.spread_k

@@ -9,7 +9,7 @@ model lacks.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from ..io import statistics
 from ..io.logs.run import Run
 from ..model import native
 from ..model.simulate import fades_per_s, hidden_k, simulate_run
+from ..model.spec import AMBIENT_OFFSET, SENSOR_OFFSET
 
 FIRST_S = 60.0
 """Of a run, what it is told by."""
@@ -163,6 +164,16 @@ def without(off: np.ndarray, moves: np.ndarray, sigma_k: float, alike: float) ->
         weight = 1.0 / (alike * max(float(np.mean((off - shift * moves) ** 2)), 1e-12))
         shift = weight * float(moves @ off) / (weight * float(moves @ moves) + 1.0 / sigma_k**2)
     return off - shift * moves
+
+
+def over_logged_k(values: Mapping[str, float]) -> float | None:
+    """Return by how much what springs lose heat to is warmer than it was logged, K, as runs of a fit say of another; None where none does.
+
+    What makes it so stays from run to run: where the room's thermometer is, heat that nobody logs. Thermometers that all read
+    too much show the same.
+    """
+    each = [[v for k, v in values.items() if k.partition("@")[0] == own] for own in (AMBIENT_OFFSET, SENSOR_OFFSET)]
+    return sum(float(np.mean(one)) for one in each if one) if any(each) else None
 
 
 def spread_k(ambient_c: Sequence[float]) -> float:

@@ -19,7 +19,13 @@ from ..io.toml_file import At, Keys, TomlFile, did_you_mean, number, table, whol
 from . import cooling, native, stiffness
 
 SCHEMA = "ninespring.model/1"
-ROOMS = ("room_spread_k", "room_over_first_k", "room_over_first_sigma_k", "room_first_minute_misses_k")
+ROOMS = (
+    "room_over_logged_k",
+    "room_spread_k",
+    "room_over_first_k",
+    "room_over_first_sigma_k",
+    "room_first_minute_misses_k",
+)
 ERRORS = ("rmse_before_c", "rmse_after_c", "hottest_c", *ROOMS)
 SPRING_KEYS = {
     "wire_diameter_mm": (0.01, 10.0),

@@ -30,6 +30,8 @@ class Run:
     fan: np.ndarray
     ambient_c: np.ndarray | None
     """(n,) or None where the log has none."""
+    room_told: bool = False
+    """`ambient_c` is where a model has the room, not where it was logged."""
     current_a: np.ndarray | None = None
     voltage_v: np.ndarray | None = None
     layers: int = 1
