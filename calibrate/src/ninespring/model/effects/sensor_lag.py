@@ -22,7 +22,9 @@ def _mirror(values: Mapping[str, float], get: Callable[[str], float]) -> Mapping
 def _candidates(scene: Scene) -> Iterator[Candidate]:
     step = scene.step_s
     number = positive(LAG, 0.02 * step, 600.0, 4.0 * step)
-    yield one_number(number, 3.0 * step, most=8.0, more_starts=({LAG: 15.0 * step},), mirror=_mirror)
+    # of a spring alone nothing tells, and what touches it is the quicker one
+    mirror = _mirror if scene.springs > 1 else None
+    yield one_number(number, 3.0 * step, most=8.0, more_starts=({LAG: 15.0 * step},), mirror=mirror)
 
 
 EFFECT = Effect("sensor_lag", _candidates, says=says("The thermometers lag {}.", LAG, "s"))
