@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from ninespring.find import diagnosis
+from ninespring.infer.predict import in_its_room, predict
 from ninespring.io import results
 from ninespring.io.logs import log_text, read_log
+from ninespring.io.statistics import rms
 from ninespring.model.models import Array, Model
 from ninespring.say.page import findings
 from two_heaters import levels
@@ -44,13 +46,18 @@ def two_heaters(folder: Path, runs: list[dict[str, float]], *, volts: bool = Fal
     return out
 
 
-def diagnosed(paths: list[Path]) -> dict[str, Any]:
+def diagnosis_of(paths: list[Path]) -> diagnosis.Diagnosis:
     """Diagnose logs of the two heaters, declared roughly."""
     model = Model(Array(1, 2))
     model.parameters = {"heat_capacity_j_per_k": CAPACITY, "loss_w_per_k": 0.01, "command_power_w": 0.6}
     found = diagnosis.diagnose(Array(1, 2), [read_log(path, 2) for path in paths], model=model)
     assert not any("@" in name for name in found.model.parameters), "what is a run's own is in no model"
-    return found.result
+    return found
+
+
+def diagnosed(paths: list[Path]) -> dict[str, Any]:
+    """Return what diagnosis.json has of them."""
+    return diagnosis_of(paths).result
 
 
 @pytest.mark.parametrize("volts", [False, True])
@@ -84,6 +91,19 @@ def test_offsets_of_several_runs_come_out_each_at_its_size(tmp_path: Path) -> No
     assert one["spread"]["unit"] == "K"
     assert one["spread"]["value"] == pytest.approx(1.05, rel=0.3)
     assert result["effects"] == []
+
+
+def test_surroundings_that_are_elsewhere_in_all_runs_are_one_number_which_a_further_run_is_predicted_with(
+    tmp_path: Path,
+) -> None:
+    *fitted, unseen = two_heaters(tmp_path, [{"room": 2.5}, {"room": 2.5}, {"room": 2.5}])
+    found = diagnosis_of(fitted)
+    (one,) = found.told.runs_differ
+    assert one.parameters["ambient_offset_k"].value == pytest.approx(2.5, abs=0.1) and "in all runs" in one.text
+    assert not found.told.effects, "thermometers of which no power is known show no gain"
+    run = in_its_room(found.model, read_log(unseen, 2))
+    assert in_its_room(found.model, run) is run and "warmer than ambient_c" in run.notes[-1]
+    assert rms([predict(found.model, run) - run.temperature_c]) < 1.2 * NOISE_C
 
 
 def test_runs_that_are_alike_are_not_said_to_differ(tmp_path: Path) -> None:

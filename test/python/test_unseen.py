@@ -18,13 +18,16 @@ from ninespring.find.unseen import LAG, OF_THAT_DAY, Unseen, _hardly_shown, erro
 from ninespring.infer.declared import base_spec
 from ninespring.infer.fit import Fit
 from ninespring.infer.problem import Problem
+from ninespring.infer.scene import scene_of
 from ninespring.io.logs.run import Run
+from ninespring.model import effects as library
+from ninespring.model.effects.runs_differ import ALIKE
 from ninespring.model.models import Array
 from ninespring.model.spec import RUN_AMBIENT, Free, Spec
 
 
 def model(*effects: str) -> Any:
-    return SimpleNamespace(spec=SimpleNamespace(effects=effects))
+    return SimpleNamespace(spec=SimpleNamespace(effects=effects, variant=tuple((one, "") for one in effects)))
 
 
 class Told(Unseen):
@@ -236,7 +239,7 @@ def test_what_is_the_same_in_all_runs_is_no_drift_and_nothing_of_a_run_alone(
         pass
 
     def begin(problem: Any, candidates: Any, *_: Any) -> None:
-        raise Begun({one.effect for one in candidates})
+        raise Begun({one.effect for one in candidates if one.variant != ALIKE})
 
     monkeypatch.setattr(diagnosis.search, "Search", begin)
     runs = [replace(one_node(0.0, seed), ambient_c=ambient) for seed, ambient in ((1, None), (2, np.full(600, 20.0)))]
@@ -381,6 +384,18 @@ def one_node(wander_k: float, seed: int = 1) -> Run:
         astray[k] = 0.995 * astray[k - 1] + 0.1 * wander_k * rng.standard_normal()
     read = (shown + astray + 0.05 * rng.standard_normal(600))[:, None]
     return Run("one", "", time_s, "command", drive, read, np.zeros(600), np.full(600, 20.0))
+
+
+@pytest.mark.parametrize("springs", [1, 2])
+def test_what_shows_the_same_in_commands_is_looked_for_once(springs: int) -> None:
+    """A gain of all thermometers is the commands' power; a spring alone is as late by its thermometer as by itself."""
+    run = one_node(0.0)
+    wide = replace(
+        run, drive=np.repeat(run.drive, springs, axis=1), temperature_c=np.repeat(run.temperature_c, springs, axis=1)
+    )
+    known = library.candidates(scene_of(Problem(Array(1, springs), [wide])))
+    assert not [one for one in known if one.variant == "all sensors"]
+    assert [one.mirror is not None for one in known if one.effect == LAG] == [springs > 1]
 
 
 def test_a_run_alone_is_foretold_from_its_half_and_from_two_thirds() -> None:

@@ -468,7 +468,7 @@ def _searched(
     own = effects.of_runs(scene)
     everything = known = [c for c in (*known, *own) if c.effect not in spec.effects]
     if alike:
-        known = [c for c in known if c.effect not in unseen.OF_THAT_DAY]
+        known = [c for c in known if not unseen.of_that_day(c.effect, c.variant)]
     found = search.Search(problem, known, base, progress, dict(fits or {}))
     final, without, contenders = found.run()
     fits = found.fits

@@ -18,6 +18,7 @@ from ..infer.fit import Fit
 from ..infer.problem import Problem
 from ..model import effects
 from ..model.effects import Candidate
+from ..model.effects.runs_differ import ALIKE
 from ..model.spec import RUNS_OWN, Spec
 from .evidence import difference, excess, fit_factor, gain, log_evidence, relief
 from .screen import Screen
@@ -229,7 +230,7 @@ class Search:
         several.
         """
         if len(self.problem.runs) > 1:
-            own = [len(set(fit.spec.effects) & set(RUNS_OWN)) for fit in (one, other)]
+            own = [sum(e in RUNS_OWN and v != ALIKE for e, v in fit.spec.variant) for fit in (one, other)]
             if own[0] > own[1] and gain(one, other) < MIN_GAIN:
                 return False
             if own[0] < own[1] and gain(other, one) < MIN_GAIN:

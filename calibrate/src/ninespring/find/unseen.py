@@ -21,6 +21,7 @@ from ..infer.problem import BLOCK_S, HARDLY, Problem
 from ..io import results
 from ..io.logs.run import Run
 from ..io.statistics import rms
+from ..model.effects.runs_differ import ALIKE
 from ..model.simulate import simulate_run
 from ..model.spec import RUNS_OWN, Free, Spec
 from .evidence import EQUIVALENT
@@ -46,7 +47,12 @@ STEPS = 25
 LAG = "sensor_lag"
 WITH_LAG = " with a lag"
 OF_THAT_DAY = (*RUNS_OWN, "ambient_drift")
-"""Effects that no other run can tell: it has its own."""
+"""Effects that no other run can tell, but in the variant that is the same in all: it has its own."""
+
+
+def of_that_day(effect: str, variant: str) -> bool:
+    """Return whether an effect is of a run's day alone."""
+    return effect in OF_THAT_DAY and variant != ALIKE
 
 
 @dataclass(frozen=True)
@@ -256,9 +262,9 @@ class Unseen:
         alone = bool(self.splits) and self.splits[0].alone
         if alone and not self.worse(fit):
             return fit
-        of_that_day = set(OF_THAT_DAY) - set(RUNS_OWN if alone else ())
-        for effect in fit.spec.effects:
-            if effect in of_that_day and effect not in self.base.spec.effects:
+        for effect, variant in fit.spec.variant:
+            rests = alone and effect in RUNS_OWN
+            if of_that_day(effect, variant) and not rests and effect not in self.base.spec.effects:
                 fit = reduced(fit, effect)
         return fit
 
@@ -279,7 +285,7 @@ class Unseen:
                 break
             fewer = {effect: reduced(bare, effect) for effect in names}
             if not self.worse(bare):
-                if any(e in OF_THAT_DAY and e not in self.base.spec.effects for e in fit.spec.effects):
+                if any(of_that_day(*one) and one[0] not in self.base.spec.effects for one in fit.spec.variant):
                     break  # the unseen has that day's, too: it says too little of what comes true
                 true = {effect: self.comes_true(bare, fewer[effect]) for effect in names}
                 out = min(true, key=true.__getitem__)

@@ -180,7 +180,7 @@ class Problem:
         if ambient is None and constant is not None:
             ambient = np.full(len(run.time_s), constant)
         if ambient is not None:
-            ambient = ambient + values.get(f"{AMBIENT_OFFSET}@{run_index + 1}", 0.0)
+            ambient = ambient + values.get(f"{AMBIENT_OFFSET}@{run_index + 1}", values.get(AMBIENT_OFFSET, 0.0))
         for name, hats in self.hats.items():
             prefix = f"{name}@{run_index + 1}."
             drift = [values.get(f"{prefix}{k}", 0.0) for k in range(1, hats[run_index].shape[1] + 1)]

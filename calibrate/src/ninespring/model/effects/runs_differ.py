@@ -10,10 +10,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from ..spec import AMBIENT_OFFSET, DRIVE_GAIN, RUN_AMBIENT, RUN_DRIVE, RUN_SENSOR, SENSOR_OFFSET, Free
-from .effect import Candidate, Effect, Numbers, Scene, percent, sized
+from .effect import Candidate, Effect, Numbers, Scene, one_number, percent, sized
 
 GAIN_SPREAD, OFFSET_SPREAD_K = 0.2, 3.0
 """What is believed before of how far runs lie apart: next to nothing; the data's own spread takes its place."""
+
+ALIKE = "the same in all runs"
+"""Variant of surroundings that are elsewhere than where they are logged, as by a sensor that stands there, or heat that nobody logs."""
 
 RESTED_K = 1.0
 """How far from where a rested run begins its room is, one sigma (infer/room.py has the same of rooms that nobody logged)."""
@@ -44,6 +47,8 @@ def _each_run(scene: Scene, key: str, shows: bool) -> Iterator[Candidate]:
     probes = tuple({f.key: moved if f is one else still for f in free} for one in free)
     # flexible: what is the array's own, and the same in all runs, comes first; the room of the only run is one number
     yield Candidate("each run its own", free, probes, signed=True, most=10.0, neutral=still, flexible=scene.runs > 1)
+    if key == AMBIENT_OFFSET and scene.runs > 1:
+        yield one_number(replace(free[0], key=key, run=None), 1.0, ALIKE, signed=True, most=10.0)
 
 
 def _gains(numbers: Numbers, variant: str) -> str:
@@ -64,7 +69,8 @@ def _readings(numbers: Numbers, variant: str) -> str:
 def _off(number: tuple[float, float | None], more: str, less: str, name: str) -> str:
     value, error = number
     size, bracket, rest = sized(abs(value), error, "K").partition(" (")
-    return f"{size} {more if value > 0 else less}{bracket}{rest} in run {name.partition('@')[2]}"
+    run = name.partition("@")[2]
+    return f"{size} {more if value > 0 else less}{bracket}{rest} in {f'run {run}' if run else 'all runs'}"
 
 
 EFFECTS = (
