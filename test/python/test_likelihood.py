@@ -299,16 +299,49 @@ def test_a_fit_looks_for_a_room_where_its_run_began_or_where_others_were() -> No
 
 
 def test_a_room_that_was_beside_its_log_is_so_in_another_run() -> None:
-    fitted_k = {"ambient_offset_k@1": 2.0, "ambient_offset_k@2": 3.0, "run_sensor_offset_k@1": 0.5, "ambient_c@3": 20.0}
-    assert room.over_logged_k(fitted_k) == pytest.approx(3.0)
-    assert room.over_logged_k({"ambient_c@1": 20.0}) is None
+    fitted_k = {"ambient_offset_k@1": 2.9, "ambient_offset_k@2": 3.1, "run_sensor_offset_k@1": 0.5, "ambient_c@3": 20.0}
+    assert room.over_logged_k(fitted_k, {}) == pytest.approx(3.5, rel=0.01)
+    assert room.over_logged_k({"ambient_c@1": 20.0}, {}) is None
     model = Model(Array(1, 1))
-    model.provenance = {"room_over_logged_k": 2.5}
+    model.provenance = {"room_over_logged_k": 2.5, "room_over_logged_s": 3600.0}
     run = replace(one_run(23.0, 23.0), ambient_c=np.full(120, 20.0))
     there = in_its_room(model, run)
-    assert there.ambient_c is not None and np.all(there.ambient_c == 22.5)
-    assert "2.5 K warmer than ambient_c" in there.notes[-1] and in_its_room(model, there) is there
-    assert in_its_room(Model(Array(1, 1)), run) is run
+    assert there.ambient_c is not None and there.ambient_c == pytest.approx(22.5)
+    assert there.notes[-1].endswith("it was in what the model was fitted to") and in_its_room(model, there) is there
+    assert "2.5 K warmer than ambient_c" in there.notes[-1] and in_its_room(Model(Array(1, 1)), run) is run
+
+
+def test_of_a_room_beside_its_log_no_more_is_carried_than_runs_agree_on_and_readings_fix() -> None:
+    def carried(values: list[float], error_k: float = 0.0) -> float | None:
+        named = {f"ambient_offset_k@{r + 1}": value for r, value in enumerate(values)}
+        return room.over_logged_k(named, dict.fromkeys(named, error_k))
+
+    assert carried([3.0, 3.0, 3.0]) == pytest.approx(3.0)
+    assert carried([2.0, 4.0, 3.0]) == pytest.approx(3.0 * 9.0 / (9.0 + 1.0 / 3.0))
+    assert carried([3.0, -2.0, 1.0]) is None, "they do not agree"
+    assert carried([3.0], 0.5) == pytest.approx(3.0 * 9.0 / 9.25) and carried([3.0], 3.5) is None
+    assert room.over_logged_k({"ambient_offset_k": 3.0}, {"ambient_offset_k": math.inf}) is None, "nothing shows it"
+
+
+def test_a_room_beside_its_log_in_short_runs_is_not_so_for_good() -> None:
+    """Runs of two minutes beside a plate that takes ten to be as warm as its room; a run that goes on for as long as that."""
+    model = Model(Array(1, 1))
+    model.effects = ["plate_conduction"]
+    model.parameters = {"loss_w_per_k": 0.003, "heat_capacity_j_per_k": 0.3, "plate_loss_w_per_k": 0.0}
+    model.parameters["plate_heat_capacity_j_per_k"] = 1.5
+    model.provenance = {"room_over_logged_k": 3.0, "room_over_logged_s": 120.0}
+    run = one_run(23.0, 23.0)
+    run = replace(run, time_s=np.arange(120.0) * 5.0, ambient_c=np.full(120, 20.0))
+    there = in_its_room(model, run)
+    assert there.ambient_c is not None
+    beside_k = there.ambient_c - 20.0
+    assert beside_k[run.time_s <= 120.0] == pytest.approx(3.0), "for as long as it was seen it is the same"
+    seen = 1.0 - math.exp(-120.0 / 600.0)
+    assert beside_k[-1] == pytest.approx(3.0 * (seen + (1.0 - seen) * 120.0 / 595.0))
+    assert "at the end, as those runs took 120 s" in there.notes[-1]
+    model.provenance["room_over_logged_s"] = 3600.0
+    there = in_its_room(model, run)
+    assert there.ambient_c is not None and there.ambient_c == pytest.approx(23.0), "they were long enough to settle"
 
 
 def test_what_a_room_explains_is_taken_out_as_far_as_it_is_unknown() -> None:

@@ -22,8 +22,8 @@ from ..io import results
 from ..io.logs.run import Run
 from ..io.statistics import rms
 from ..model.effects.runs_differ import ALIKE
-from ..model.simulate import simulate_run
-from ..model.spec import RUNS_OWN, Free, Spec
+from ..model.simulate import settles_s, simulate_run
+from ..model.spec import RUN_AMBIENT, RUN_SENSOR, RUNS_OWN, Free, Spec
 from .evidence import EQUIVALENT
 from .search import Search
 
@@ -146,7 +146,8 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, n
     problem.learn_starts(spec, [start.get(f.key, f.start) for f in spec.free])
     if colour is not None:
         problem.take_for(colour)
-    fitted = problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS)
+    beside = not split.alone and not {RUN_AMBIENT, RUN_SENSOR}.isdisjoint(spec.effects)
+    fitted = problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS, errors=beside)
     # what only the left-out run shows, these do not tell: it stays
     known = {key: start[key] for key in (*fitted.stuck, *_hardly_shown(fit, fitted, kept)) if key in start}
     fitted.values = np.array([known.get(f.key, value) for f, value in zip(spec.free, fitted.values, strict=True)])
@@ -160,7 +161,9 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, n
         return (run.temperature_c - simulate_run(plant.copy(), run, ambient))[split.counts]
 
     if run.ambient_c is not None:
-        off = off_in(run.ambient_c + (room.over_logged_k(values) or 0.0))
+        over_k = room.over_logged_k(values, fitted.stderr() if beside else {}) or 0.0
+        seen_s = max(one.duration_s for one in problem.runs)
+        off = off_in(run.ambient_c + room.beside_log_k(run, over_k, seen_s, settles_s(plant, run.springs)))
         return off, off
     told, sigma = _room(problem, run, values, plant)
     ambient = np.full(len(run.time_s), told)

@@ -94,8 +94,9 @@ def model_of(
         "rmse_after_c": statistics.rms(fit.residual),
         "hottest_c": max(float(np.nanmax(run.temperature_c)) for run in runs),
     }
-    if (over_k := room.over_logged_k(fit.as_dict())) is not None:
+    if (over_k := room.over_logged_k(fit.as_dict(), errors)) is not None:
         model.provenance["room_over_logged_k"] = over_k
+        model.provenance["room_over_logged_s"] = max(run.duration_s for run in problem.runs)
     if rooms:
         told = room.Rooms.of([problem.runs[r] for r in rooms], constants, problem.plant_for(fit.spec, fit.values))
         model.provenance["room_spread_k"] = told.spread_k

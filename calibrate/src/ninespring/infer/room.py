@@ -166,14 +166,34 @@ def without(off: np.ndarray, moves: np.ndarray, sigma_k: float, alike: float) ->
     return off - shift * moves
 
 
-def over_logged_k(values: Mapping[str, float]) -> float | None:
-    """Return by how much what springs lose heat to is warmer than it was logged, K, as runs of a fit say of another; None where none does.
+def over_logged_k(values: Mapping[str, float], errors: Mapping[str, float]) -> float | None:
+    """Return by how much what springs lose heat to is warmer than it was logged, K, as runs of a fit, by numbers and their standard errors,
+    say of another; None where none does, or none that is more than its own error.
 
     What makes it so stays from run to run: where the room's thermometer is, heat that nobody logs. Thermometers that all read
-    too much show the same.
+    too much show the same. Before it is seen it is 0, to ROOMS_K: runs that disagree, or hardly tell, leave it there.
     """
-    each = [[v for k, v in values.items() if k.partition("@")[0] == own] for own in (AMBIENT_OFFSET, SENSOR_OFFSET)]
-    return sum(float(np.mean(one)) for one in each if one) if any(each) else None
+    over, variance = 0.0, 0.0
+    for own in (AMBIENT_OFFSET, SENSOR_OFFSET):
+        each = {key: value for key, value in values.items() if key.partition("@")[0] == own}
+        if not each:
+            continue
+        over += float(np.mean(list(each.values())))
+        apart = float(np.var(list(each.values()), ddof=1)) if len(each) > 1 else 0.0
+        unsure = float(np.mean([errors.get(key, 0.0) ** 2 for key in each]))
+        variance += (apart + unsure) / len(each)
+    return over * ROOMS_K**2 / (ROOMS_K**2 + variance) if over**2 > variance else None
+
+
+def beside_log_k(run: Run, over_k: float, seen_s: float, settles_s: float) -> np.ndarray:
+    """Return by how much what springs lose heat to is warmer than it was logged, (rows,), K, where it was `over_k` in runs of `seen_s`.
+
+    In runs that are long beside the time in which the array settles with its room, that was seen to be the room. Of shorter ones it may
+    be anything that lasted as long as they did, and that what has lasted so long goes on to a later time is as likely as `seen_s` is a part of it.
+    """
+    since_s = np.maximum(run.time_s - run.time_s[0], 1e-9)
+    room = 1.0 - math.exp(-seen_s / settles_s)
+    return over_k * (room + (1.0 - room) * np.minimum(1.0, seen_s / since_s))
 
 
 def spread_k(ambient_c: Sequence[float]) -> float:

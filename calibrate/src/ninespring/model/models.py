@@ -21,6 +21,7 @@ from . import cooling, native, stiffness
 SCHEMA = "ninespring.model/1"
 ROOMS = (
     "room_over_logged_k",
+    "room_over_logged_s",
     "room_spread_k",
     "room_over_first_k",
     "room_over_first_sigma_k",

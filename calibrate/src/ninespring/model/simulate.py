@@ -92,6 +92,16 @@ def fades_per_s(plant: native.Plant) -> float:
     return plant.get("loss_w_per_k") / plant.get("heat_capacity_j_per_k")
 
 
+def settles_s(plant: native.Plant, springs: int) -> float:
+    """Return the time in which a plant's springs, and what they share, come to be as warm as their room, s: all they hold over all they lose."""
+    holds, loses = springs * plant.get("heat_capacity_j_per_k"), springs * plant.get("loss_w_per_k")
+    if plant.has("plate_conduction"):
+        holds, loses = holds + plant.get("plate_heat_capacity_j_per_k"), loses + plant.get("plate_loss_w_per_k")
+    if plant.has("shared_air"):
+        holds += plant.get("air_heat_capacity_j_per_k")
+    return holds / max(loses, 1e-9)
+
+
 def simulate_run(
     plant: native.Plant,
     run: Run,
