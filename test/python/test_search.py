@@ -124,6 +124,11 @@ def test_a_fit_begins_with_a_model_that_is_given(tmp_path: Path) -> None:
 
 def test_an_alloy_that_went_astray_before_its_company_came_begins_again_beside_it(tmp_path: Path) -> None:
     found = searched_pulse(tmp_path / "pulse.csv")
+    # a room that drifts quicker than any does: without it the alloy goes astray here
+    found.candidates = [
+        replace(one, free=(replace(one.free[0], low=-60.0, high=60.0),)) if one.variant == "ramp" else one
+        for one in found.candidates
+    ]
     astray = with_one_after_the_other(found, "latent_heat", "ambient_drift")
     again = found.begun_again(astray, found.base)
     assert again.spec.effects != () and set(again.spec.effects) == set(astray.spec.effects)

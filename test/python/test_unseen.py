@@ -395,7 +395,16 @@ def test_what_shows_the_same_in_commands_is_looked_for_once(springs: int) -> Non
     )
     known = library.candidates(scene_of(Problem(Array(1, springs), [wide])))
     assert not [one for one in known if one.variant == "all sensors"]
+    unlogged = library.candidates(scene_of(Problem(Array(1, springs), [replace(wide, ambient_c=None)])))
+    assert [one for one in unlogged if one.variant == "all sensors"], "beside no log of the room it stands for both"
     assert [one.mirror is not None for one in known if one.effect == LAG] == [springs > 1]
+
+
+def test_a_room_drifts_no_faster_than_rooms_do() -> None:
+    """What heats springs by 48 K/h for two minutes goes on so in no longer run: it is nearer to them than the room."""
+    known = library.candidates(scene_of(Problem(Array(1, 1), [one_node(0.0)])))
+    (ramp,) = next(one.free for one in known if one.variant == "ramp")
+    assert [ramp.outer(ramp.inner(rate)) for rate in (-48.0, 5.0, 48.0)] == [-20.0, 5.0, 20.0]
 
 
 def test_a_run_alone_is_foretold_from_its_half_and_from_two_thirds() -> None:

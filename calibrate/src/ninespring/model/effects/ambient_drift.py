@@ -8,10 +8,13 @@ from .effect import Candidate, Effect, Numbers, Scene, linear, one_number, sized
 KINDS = (("free", "ambient_drift_k", 500.0), ("slow", "ambient_slow_drift_k", 1800.0))
 """Variants with knots: name, key of their numbers, the shortest run (s) that could show one."""
 
+MOST_K_PER_H = 20.0
+"""No room goes on faster: what does so in a run of minutes is heat nearer to the springs, and goes on in no longer one."""
+
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
     ramp = "ambient_ramp_k_per_h"
-    number, probe = linear(ramp, -60.0, 60.0, 2.0, 4.0), min(20.0, 3600.0 / max(60.0, scene.duration_s))
+    number, probe = linear(ramp, -MOST_K_PER_H, MOST_K_PER_H, 2.0, 4.0), min(20.0, 3600.0 / max(60.0, scene.duration_s))
     yield one_number(number, probe, "ramp", fixed=(("ambient_amplitude_k", 0.0),), signed=True, most=20.0)
     for variant, key, shortest_s in KINDS:
         if scene.duration_s < shortest_s:

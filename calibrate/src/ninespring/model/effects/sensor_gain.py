@@ -9,7 +9,8 @@ GAIN, OFFSET = "sensor_gain", "sensor_offset_k"
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
-    if scene.modes != {"command"}:  # there a gain of all is the commands' power, and an offset the room's
+    # of commands a gain of all is their power, and an offset the room's, where that was logged
+    if scene.modes != {"command"} or not scene.ambient_logged:
         yield _off("all sensors", linear(GAIN, 0.7, 1.4, 1.02, 0.05), linear(OFFSET, -20.0, 20.0, 0.5, 1.0))
     for k in range(1, scene.springs + 1) if scene.springs > 1 else ():
         gain, offset = linear(f"{GAIN}[{k}]", 0.5, 2.0, 1.0, 0.05), linear(f"{OFFSET}[{k}]", -20.0, 20.0, 0.0, 1.0)
