@@ -121,8 +121,13 @@ TEST(a_frozen_sensor_is_found_within_two_seconds_and_its_neighbours_go_on)
 {
     rig mega;
     mega.boot_niti({"policy precompensate", "on 1", "on 5"});
-    for (const double more_ms : {4000.0, 116000.0}) {
+    static const struct {
+        double more_ms;
+        std::uint8_t stage;
+    } table[] = {{4000.0, DRIVE_POLICY_STAGE_HEAT}, {31000.0, DRIVE_POLICY_STAGE_HOLD}};
+    for (const auto &[more_ms, stage] : table) {
         mega.run_ms(more_ms);
+        TEST_ASSERT_EQUAL_UINT8(stage, mega.view().spring[4].stage);
         for (const board_fault_t fault :
              {BOARD_FAULT_FREEZE, BOARD_FAULT_FREEZE_CURRENT, BOARD_FAULT_FREEZE_VOLTAGE}) {
             try_from_here([&] {
@@ -170,7 +175,7 @@ TEST(a_sensor_that_begins_to_lie_is_found_beside_the_others_however_often_it_is_
         double at_ms[2];
         std::vector<lie> lies[2];
     } table[] = {{"pattern 111101111",
-                  {4000.0, 130e3},
+                  {4000.0, 70e3},
                   {{{0.52, 1.0}, {1.0, 0.5}, {1.0, 0.8}}, {{0.52, 1.0}, {0.8, 1.0}}}},
                  {"pattern 100000000", {4000.0}, {{{0.8, 1.0}}}}};
     for (const auto &one : table) {
@@ -202,6 +207,8 @@ TEST(a_sensor_that_begins_to_lie_is_found_beside_the_others_however_often_it_is_
         for (unsigned n = 0; n < 2 && !one.lies[n].empty(); ++n) {
             mega.run_ms(one.at_ms[n] - now_ms);
             now_ms = one.at_ms[n];
+            TEST_ASSERT_EQUAL_UINT8(n == 0 ? DRIVE_POLICY_STAGE_HEAT : DRIVE_POLICY_STAGE_HOLD,
+                                    mega.view().spring[0].stage);
             for (const lie &lie : one.lies[n]) {
                 try_from_here([&] { lies(now_ms, lie); });
             }
