@@ -74,226 +74,6 @@ class Dashboard:
         return code
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield chromium
-        chromium.close()
-
-
-@pytest.fixture(scope="module")
-def simulated(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Dashboard, Path]]:
-    folder = tmp_path_factory.mktemp("recordings")
-    dashboard = Dashboard(folder, "--simulate")
-    yield dashboard, folder
-    assert dashboard.end() == 0
-
-
-def opened(browser: Browser, dashboard: Dashboard) -> Page:
-    page = browser.new_page()
-    page.set_default_timeout(60_000)
-    page.problems = []
-    page.on("pageerror", lambda error: page.problems.append(str(error)))
-    page.goto(dashboard.url, wait_until="commit")  # the plots' library may come later
-    page.wait_for_selector("#array button")
-    return page
-
-
-def on_a_page(test: Callable[..., None]) -> Callable[..., None]:
-    """Mark a test that needs a browser and a simulated board."""
-    return needs_browser(needs_board(test))
-
-
-@pytest.fixture
-def page(browser: Browser, simulated: tuple[Dashboard, Path]) -> Iterator[Page]:
-    """Yield a page of the simulated board, in which nothing has gone wrong at its end."""
-    page = opened(browser, simulated[0])
-    yield page
-    assert page.problems == []
-    page.close()
-
-
-other = page
-"""A second one."""
-
-
-def enter(page: Page, line: str) -> None:
-    """Type a line into the page's console."""
-    page.fill("#line", line)
-    page.press("#line", "Enter")
-
-
-def spring(page: Page, number: int, part: str = "") -> object:
-    return page.locator(f"#array button:nth-child({number}){' .' + part if part else ''}")
-
-
-def sum_a(page: Page) -> float:
-    return float(page.inner_text("#sum"))
-
-
-@on_a_page
-def test_a_click_heats_a_spring_and_stop_ends_it_from_button_and_key(page: Page) -> None:
-    page.select_option("#policy", "open")  # a set current at once: precompensate waits until nothing can be hot
-    expect(page.locator("#policy")).to_have_value("open")
-    for press in (lambda: page.click("#stop"), lambda: page.keyboard.press("Escape")):
-        page.click("#clear")
-        spring(page, 5).click()
-        expect(spring(page, 5, "amps")).to_have_text(re.compile(r"^1\.[45]\d A"), timeout=15_000)
-        expect(spring(page, 5)).to_have_class(re.compile("on"))
-        expect(spring(page, 5, "bounds")).to_have_text(re.compile(r"^-?\d+…\d+°$"))
-        assert sum_a(page) > 1.0
-        press()
-        expect(page.locator("#sum")).to_have_text("0.00", timeout=30_000)
-        expect(page.locator("#state")).to_have_text("stopped")
-        expect(page.locator("#faults li").first).to_contain_text("stopped")
-        expect(spring(page, 5)).not_to_have_class(re.compile("on"))
-    page.click("#clear")
-    expect(page.locator("#state")).to_have_text(re.compile("^(ready|not known yet)$"))
-
-
-@on_a_page
-def test_why_a_spring_is_believed_to_be_where_it_is_is_shown_and_follows(page: Page) -> None:
-    page.click("#clear")
-    page.click("#why-card summary")
-    page.select_option("#why-spring", "7")
-    expect(page.locator("#why")).to_contain_text("spring 7 in the last 4 hours")  # nothing yet
-    enter(page, "model cold")
-    expect(page.locator("#why")).to_contain_text("it is said to be known", timeout=30_000)
-    expect(page.locator("#why")).to_contain_text("of martensite start: now ")
-    page.select_option("#why-spring", "2")
-    expect(page.locator("#why")).to_contain_text("it is said to be known")
-    expect(page.locator("#log")).not_to_contain_text(
-        "it is said to be known"
-    )  # each is told once, where it was asked for
-
-
-@on_a_page
-def test_two_pages_agree_and_patterns_are_drawn_and_played(page: Page, other: Page) -> None:
-    page.click("[data-make=ring]")
-    for one in (page, other):
-        expect(one.locator("#array button.on")).to_have_count(8)
-        expect(spring(one, 5)).not_to_have_class(re.compile("on"))
-    other.click("#draw button:nth-child(1)")
-    other.click("#draw button:nth-child(9)")
-    other.click("#apply")
-    expect(page.locator("#array button.on")).to_have_count(2)
-    other.click("#add")
-    other.click("#draw button:nth-child(1)")
-    other.click("#add")
-    other.fill("#seconds", "1")
-    other.click("#play")
-    for count in (1, 2, 1):
-        expect(page.locator("#array button.on")).to_have_count(count)
-    page.click("[data-all=off]")
-    expect(other.locator("#array button.on")).to_have_count(0)
-    page.fill("#fan", "50")  # with its events, as when the slider is let go
-    expect(other.locator("#fan-shown")).to_have_text("50 %")
-    other.select_option("#policy", "precompensate")
-    expect(page.locator("#policy")).to_have_value("precompensate")
-    other.select_option("#policy", "open")
-    page.fill("#fan", "0")
-
-
-@on_a_page
-def test_settings_have_units_and_ranges_and_a_refusal_is_in_the_boards_words(page: Page) -> None:
-    page.click("#settings-card summary")
-    line = page.locator("tr[data-name=supply_limit_a]")
-    expect(line).to_contain_text("A")
-    expect(line).to_contain_text("0.1 .. 60")
-    field = line.locator("input")
-    field.fill("12.5")
-    field.press("Enter")
-    expect(page.locator("#supply")).to_have_text("of 12.5 A")
-    field.fill("99")
-    field.press("Enter")
-    expect(line.locator(".words")).to_contain_text("a number is out of range")
-    for wrong in ("0,006", "abc", ""):
-        field.fill(wrong)
-        field.press("Enter")
-        expect(line.locator(".words")).to_contain_text(f"{wrong or 'nothing'}")
-        expect(line.locator(".words")).to_contain_text("is not a number with a point")
-    field.fill("12")  # and the cell takes what is right
-    field.press("Enter")
-    expect(page.locator("#supply")).to_have_text("of 12.0 A")
-    expect(line.locator(".words")).to_be_empty()
-    field.fill("12.5")
-    field.press("Enter")
-    expect(page.locator("#supply")).to_have_text("of 12.5 A")
-    enter(page, "frobnicate")
-    expect(page.locator("#log li.bad").first).to_contain_text("unknown word")
-    enter(page, "version")
-    expect(page.locator("#log li").first).to_contain_text("ninespring")
-    enter(page, "$defaults")  # ends telemetry on the board
-    expect(page.locator("#supply")).to_have_text("of 15.0 A")
-    before = float(page.inner_text("#time"))
-    until = time.monotonic() + 30.0
-    while float(page.inner_text("#time")) <= before + 1.0:
-        assert time.monotonic() < until
-        time.sleep(0.1)
-
-
-@on_a_page
-def test_one_click_records_a_log_that_can_be_read(page: Page, simulated: tuple[Dashboard, Path]) -> None:
-    page.click("#record")
-    expect(page.locator("#recording")).to_contain_text(re.compile(r": [1-9]\d rows"))
-    page.click("#record")
-    expect(page.locator("#log li").first).to_contain_text("rows in")
-    (log,) = simulated[1].glob("*.csv")
-    assert log.read_text().startswith("# recorded: ") and "\n# $loss_w_per_k=" in log.read_text()
-    assert read_log(log, 9, temperatures=False).duration_s > 0.9
-
-
-@needs_browser
-def test_a_lost_port_comes_back_without_a_reload(browser: Browser, tmp_path: Path) -> None:
-    (tmp_path / "port").symlink_to((first := FakeBoard()).port)
-    first.stream, first.every_s = (row(0.1 * k) for k in range(10, 9999)), 0.1
-    with Dashboard(tmp_path, "--port", tmp_path / "port", ends=signal.SIGTERM) as dashboard:
-        page = opened(browser, dashboard)
-        expect(page.locator("#connection")).to_have_text("connected")
-        page.click("#record")
-        expect(page.locator("#recording")).to_contain_text(re.compile(r": [1-9]\d rows"))
-        first.pull()
-        expect(page.locator("#connection")).to_have_text("no board")
-        expect(page.locator("#trouble")).to_contain_text("went away")
-        expect(page.locator("#trouble")).to_contain_text("Since then")  # how it was lost stays, while it is looked for
-        expect(page.locator("#trouble")).to_contain_text("went away")
-        (log,) = tmp_path.glob("*.csv")
-        assert len(read_table(log).frame) >= 10
-        second = FakeBoard(stream=(row(0.1 * k) for k in range(10, 9999)), every_s=0.1)
-        (tmp_path / "port").unlink()
-        (tmp_path / "port").symlink_to(second.port)
-        expect(page.locator("#connection")).to_have_text("connected", timeout=15_000)
-        expect(page.locator("#trouble")).to_be_hidden()
-        spring(page, 1).click()
-        expect(spring(page, 1)).to_have_class(re.compile("on"))
-        assert "on 1 100" in second.sent()
-    assert second.sent().index("off all") > second.sent().index("on 1 100")
-
-
-@needs_browser
-def test_a_log_is_replayed_measured_beside_model(browser: Browser, make_log, tmp_path: Path) -> None:
-    def believe(columns: dict[str, object]) -> None:
-        columns |= {f"m{k}_c": columns[f"t{k}_c"] + 5.0 for k in range(1, 10)}
-
-    with Dashboard(tmp_path, "--replay", make_log(seconds=200, change=believe)) as dashboard:
-        page = opened(browser, dashboard)
-        expect(page.locator(".live").first).to_be_hidden()
-        expect(spring(page, 1, "measured")).to_contain_text("°")
-        parts = (
-            "tile => ['temperature', 'measured'].map((one) => parseFloat(tile.querySelector('.' + one).textContent))"
-        )
-        shown, measured = spring(page, 1).evaluate(parts)  # of one moment
-        assert shown - measured == pytest.approx(5.0, abs=0.11)  # as they are rounded
-        page.fill("#seek", "150")
-        expect(page.locator("#time")).to_have_text(re.compile(r"1[5-9]\d\.\d"))
-        page.click("#pause")
-        expect(page.locator("#state")).to_contain_text("paused")
-        before = page.inner_text("#time")
-        time.sleep(0.5)
-        assert page.inner_text("#time") == before
-
-
 def status_of(dashboard: Dashboard, *headers: str) -> str:
     words = ["curl", "-s", "-o", "/dev/null", "-w", "%{http_code}", *(one for h in headers for one in ("-H", h))]
     return subprocess.run([*words, dashboard.url], capture_output=True, text=True, timeout=20, check=True).stdout
@@ -339,57 +119,6 @@ UNKNOWN = [
     "  not known for 75 s: it may still be hot from before power-on",
     "ok",
 ]
-
-
-@needs_browser
-def test_what_is_not_known_yet_or_old_is_shown_as_that(browser: Browser, tmp_path: Path) -> None:
-    board, rows = FakeBoard({"model": UNKNOWN}), Rows()
-    board.stream, board.every_s = rows, 0.1
-    with Dashboard(tmp_path, "--port", board.port) as dashboard:
-        page = opened(browser, dashboard)
-        expect(page.locator("#unknown")).to_contain_text("75 s")
-        expect(page.locator("#state")).to_have_text("not known yet")
-        expect(page.locator("#hottest")).to_have_text("not known")
-        expect(spring(page, 1, "temperature")).to_have_text("?")
-        page.click("#cold")
-        board.answers["model"] = ["ok"]
-        expect(page.locator("#unknown")).to_be_hidden()
-        expect(page.locator("#state")).to_have_text("ready")
-        assert "model cold" in board.sent()
-        expect(page.locator("#old")).to_be_hidden()
-        rows.frozen = True
-        expect(page.locator("#old")).to_have_text(re.compile(r"What is shown is [2-9] s old"))
-        expect(page.locator("body.old")).to_have_count(1)
-        rows.frozen = False  # the board is asked for it again
-        expect(page.locator("#old")).to_be_hidden()
-        assert board.sent().count("telemetry csv 10") >= 2
-        assert page.problems == []
-
-
-@needs_browser
-def test_a_list_that_is_played_outlives_a_reload_and_can_be_ended(browser: Browser, tmp_path: Path) -> None:
-    board = FakeBoard(stream=Rows(), every_s=0.1)
-    with Dashboard(tmp_path, "--port", board.port) as dashboard:
-        page = opened(browser, dashboard)
-        page.click("#add")
-        page.click("#draw button")
-        page.click("#add")
-        page.fill("#seconds", "0.5")
-        page.click("#play")
-        expect(page.locator("#list li.now")).to_have_count(1)
-        page.reload()
-        other = opened(browser, dashboard)
-        for one in (page, other):
-            expect(one.locator("#list li")).to_have_count(2)
-            expect(one.locator("#seconds")).to_have_value("0.5")
-        other.click("#end-play")
-        expect(page.locator("#end-play")).to_be_hidden()
-        played = board.sent().count("pattern 1")
-        time.sleep(1.2)
-        assert board.sent().count("pattern 1") == played >= 1
-        assert "off all" not in board.sent()
-        page.reload()
-        expect(page.locator("#list li")).to_have_count(2)
 
 
 def awaited(
@@ -830,6 +559,287 @@ def test_an_hour_is_kept_every_row_for_ten_minutes_and_one_a_second_before() -> 
     assert told["time_s"][0] == kept[0]
     kept_by._remember({"time_s": 1.0, "temperature_c": [20.0]})  # the board began anew
     assert kept_by.history()["time_s"] == [1.0]
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def browser(chromium: Browser) -> Iterator[Browser]:
+    """Yield the browser, of which no page goes on drawing beside the next test."""
+    yield chromium
+    for context in chromium.contexts:
+        context.close()
+
+
+def opened(browser: Browser, dashboard: Dashboard) -> Page:
+    page = browser.new_page()
+    page.set_default_timeout(60_000)
+    page.problems = []
+    page.on("pageerror", lambda error: page.problems.append(str(error)))
+    page.goto(dashboard.url, wait_until="commit")  # the plots' library may come later
+    page.wait_for_selector("#array button")
+    return page
+
+
+def spring(page: Page, number: int, part: str = "") -> object:
+    return page.locator(f"#array button:nth-child({number}){' .' + part if part else ''}")
+
+
+@needs_browser
+def test_a_lost_port_comes_back_without_a_reload(browser: Browser, tmp_path: Path) -> None:
+    (tmp_path / "port").symlink_to((first := FakeBoard()).port)
+    first.stream, first.every_s = (row(0.1 * k) for k in range(10, 9999)), 0.1
+    with Dashboard(tmp_path, "--port", tmp_path / "port", ends=signal.SIGTERM) as dashboard:
+        page = opened(browser, dashboard)
+        expect(page.locator("#connection")).to_have_text("connected")
+        page.click("#record")
+        expect(page.locator("#recording")).to_contain_text(re.compile(r": [1-9]\d rows"))
+        first.pull()
+        expect(page.locator("#connection")).to_have_text("no board")
+        expect(page.locator("#trouble")).to_contain_text("went away")
+        expect(page.locator("#trouble")).to_contain_text("Since then")  # how it was lost stays, while it is looked for
+        expect(page.locator("#trouble")).to_contain_text("went away")
+        (log,) = tmp_path.glob("*.csv")
+        assert len(read_table(log).frame) >= 10
+        second = FakeBoard(stream=(row(0.1 * k) for k in range(10, 9999)), every_s=0.1)
+        (tmp_path / "port").unlink()
+        (tmp_path / "port").symlink_to(second.port)
+        expect(page.locator("#connection")).to_have_text("connected", timeout=15_000)
+        expect(page.locator("#trouble")).to_be_hidden()
+        spring(page, 1).click()
+        expect(spring(page, 1)).to_have_class(re.compile("on"))
+        assert "on 1 100" in second.sent()
+    assert second.sent().index("off all") > second.sent().index("on 1 100")
+
+
+@needs_browser
+def test_a_log_is_replayed_measured_beside_model(browser: Browser, make_log, tmp_path: Path) -> None:
+    def believe(columns: dict[str, object]) -> None:
+        columns |= {f"m{k}_c": columns[f"t{k}_c"] + 5.0 for k in range(1, 10)}
+
+    with Dashboard(tmp_path, "--replay", make_log(seconds=200, change=believe)) as dashboard:
+        page = opened(browser, dashboard)
+        expect(page.locator(".live").first).to_be_hidden()
+        expect(spring(page, 1, "measured")).to_contain_text("°")
+        parts = (
+            "tile => ['temperature', 'measured'].map((one) => parseFloat(tile.querySelector('.' + one).textContent))"
+        )
+        shown, measured = spring(page, 1).evaluate(parts)  # of one moment
+        assert shown - measured == pytest.approx(5.0, abs=0.11)  # as they are rounded
+        page.fill("#seek", "150")
+        expect(page.locator("#time")).to_have_text(re.compile(r"1[5-9]\d\.\d"))
+        page.click("#pause")
+        expect(page.locator("#state")).to_contain_text("paused")
+        before = page.inner_text("#time")
+        time.sleep(0.5)
+        assert page.inner_text("#time") == before
+
+
+@needs_browser
+def test_what_is_not_known_yet_or_old_is_shown_as_that(browser: Browser, tmp_path: Path) -> None:
+    board, rows = FakeBoard({"model": UNKNOWN}), Rows()
+    board.stream, board.every_s = rows, 0.1
+    with Dashboard(tmp_path, "--port", board.port) as dashboard:
+        page = opened(browser, dashboard)
+        expect(page.locator("#unknown")).to_contain_text("75 s")
+        expect(page.locator("#state")).to_have_text("not known yet")
+        expect(page.locator("#hottest")).to_have_text("not known")
+        expect(spring(page, 1, "temperature")).to_have_text("?")
+        page.click("#cold")
+        board.answers["model"] = ["ok"]
+        expect(page.locator("#unknown")).to_be_hidden()
+        expect(page.locator("#state")).to_have_text("ready")
+        assert "model cold" in board.sent()
+        expect(page.locator("#old")).to_be_hidden()
+        rows.frozen = True
+        expect(page.locator("#old")).to_have_text(re.compile(r"What is shown is [2-9] s old"))
+        expect(page.locator("body.old")).to_have_count(1)
+        rows.frozen = False  # the board is asked for it again
+        expect(page.locator("#old")).to_be_hidden()
+        assert board.sent().count("telemetry csv 10") >= 2
+        assert page.problems == []
+
+
+@needs_browser
+def test_a_list_that_is_played_outlives_a_reload_and_can_be_ended(browser: Browser, tmp_path: Path) -> None:
+    board = FakeBoard(stream=Rows(), every_s=0.1)
+    with Dashboard(tmp_path, "--port", board.port) as dashboard:
+        page = opened(browser, dashboard)
+        page.click("#add")
+        page.click("#draw button")
+        page.click("#add")
+        page.fill("#seconds", "0.5")
+        page.click("#play")
+        expect(page.locator("#list li.now")).to_have_count(1)
+        page.reload()
+        other = opened(browser, dashboard)
+        for one in (page, other):
+            expect(one.locator("#list li")).to_have_count(2)
+            expect(one.locator("#seconds")).to_have_value("0.5")
+        other.click("#end-play")
+        expect(page.locator("#end-play")).to_be_hidden()
+        played = board.sent().count("pattern 1")
+        time.sleep(1.2)
+        assert board.sent().count("pattern 1") == played >= 1
+        assert "off all" not in board.sent()
+        page.reload()
+        expect(page.locator("#list li")).to_have_count(2)
+
+
+# The board is simulated from here to the end of this file, which takes most of a core: no other test comes behind.
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Dashboard, Path]]:
+    folder = tmp_path_factory.mktemp("recordings")
+    dashboard = Dashboard(folder, "--simulate")
+    yield dashboard, folder
+    assert dashboard.end() == 0
+
+
+def on_a_page(test: Callable[..., None]) -> Callable[..., None]:
+    """Mark a test that needs a browser and a simulated board."""
+    return needs_browser(needs_board(test))
+
+
+@pytest.fixture
+def page(browser: Browser, simulated: tuple[Dashboard, Path]) -> Iterator[Page]:
+    """Yield a page of the simulated board, in which nothing has gone wrong at its end."""
+    page = opened(browser, simulated[0])
+    yield page
+    assert page.problems == []
+
+
+other = page
+"""A second one."""
+
+
+def enter(page: Page, line: str) -> None:
+    """Type a line into the page's console."""
+    page.fill("#line", line)
+    page.press("#line", "Enter")
+
+
+def sum_a(page: Page) -> float:
+    return float(page.inner_text("#sum"))
+
+
+@on_a_page
+def test_a_click_heats_a_spring_and_stop_ends_it_from_button_and_key(page: Page) -> None:
+    page.select_option("#policy", "open")  # a set current at once: precompensate waits until nothing can be hot
+    expect(page.locator("#policy")).to_have_value("open")
+    for press in (lambda: page.click("#stop"), lambda: page.keyboard.press("Escape")):
+        page.click("#clear")
+        spring(page, 5).click()
+        expect(spring(page, 5, "amps")).to_have_text(re.compile(r"^1\.[45]\d A"), timeout=15_000)
+        expect(spring(page, 5)).to_have_class(re.compile("on"))
+        expect(spring(page, 5, "bounds")).to_have_text(re.compile(r"^-?\d+…\d+°$"))
+        assert sum_a(page) > 1.0
+        press()
+        expect(page.locator("#sum")).to_have_text("0.00", timeout=30_000)
+        expect(page.locator("#state")).to_have_text("stopped")
+        expect(page.locator("#faults li").first).to_contain_text("stopped")
+        expect(spring(page, 5)).not_to_have_class(re.compile("on"))
+    page.click("#clear")
+    expect(page.locator("#state")).to_have_text(re.compile("^(ready|not known yet)$"))
+
+
+@on_a_page
+def test_why_a_spring_is_believed_to_be_where_it_is_is_shown_and_follows(page: Page) -> None:
+    page.click("#clear")
+    page.click("#why-card summary")
+    page.select_option("#why-spring", "7")
+    expect(page.locator("#why")).to_contain_text("spring 7 in the last 4 hours")  # nothing yet
+    enter(page, "model cold")
+    expect(page.locator("#why")).to_contain_text("it is said to be known", timeout=30_000)
+    expect(page.locator("#why")).to_contain_text("of martensite start: now ")
+    page.select_option("#why-spring", "2")
+    expect(page.locator("#why")).to_contain_text("it is said to be known")
+    expect(page.locator("#log")).not_to_contain_text(
+        "it is said to be known"
+    )  # each is told once, where it was asked for
+
+
+@on_a_page
+def test_two_pages_agree_and_patterns_are_drawn_and_played(page: Page, other: Page) -> None:
+    page.click("[data-make=ring]")
+    for one in (page, other):
+        expect(one.locator("#array button.on")).to_have_count(8)
+        expect(spring(one, 5)).not_to_have_class(re.compile("on"))
+    other.click("#draw button:nth-child(1)")
+    other.click("#draw button:nth-child(9)")
+    other.click("#apply")
+    expect(page.locator("#array button.on")).to_have_count(2)
+    other.click("#add")
+    other.click("#draw button:nth-child(1)")
+    other.click("#add")
+    other.fill("#seconds", "1")
+    other.click("#play")
+    for count in (1, 2, 1):
+        expect(page.locator("#array button.on")).to_have_count(count)
+    page.click("[data-all=off]")
+    expect(other.locator("#array button.on")).to_have_count(0)
+    page.fill("#fan", "50")  # with its events, as when the slider is let go
+    expect(other.locator("#fan-shown")).to_have_text("50 %")
+    other.select_option("#policy", "precompensate")
+    expect(page.locator("#policy")).to_have_value("precompensate")
+    other.select_option("#policy", "open")
+    page.fill("#fan", "0")
+
+
+@on_a_page
+def test_settings_have_units_and_ranges_and_a_refusal_is_in_the_boards_words(page: Page) -> None:
+    page.click("#settings-card summary")
+    line = page.locator("tr[data-name=supply_limit_a]")
+    expect(line).to_contain_text("A")
+    expect(line).to_contain_text("0.1 .. 60")
+    field = line.locator("input")
+    field.fill("12.5")
+    field.press("Enter")
+    expect(page.locator("#supply")).to_have_text("of 12.5 A")
+    field.fill("99")
+    field.press("Enter")
+    expect(line.locator(".words")).to_contain_text("a number is out of range")
+    for wrong in ("0,006", "abc", ""):
+        field.fill(wrong)
+        field.press("Enter")
+        expect(line.locator(".words")).to_contain_text(f"{wrong or 'nothing'}")
+        expect(line.locator(".words")).to_contain_text("is not a number with a point")
+    field.fill("12")  # and the cell takes what is right
+    field.press("Enter")
+    expect(page.locator("#supply")).to_have_text("of 12.0 A")
+    expect(line.locator(".words")).to_be_empty()
+    field.fill("12.5")
+    field.press("Enter")
+    expect(page.locator("#supply")).to_have_text("of 12.5 A")
+    enter(page, "frobnicate")
+    expect(page.locator("#log li.bad").first).to_contain_text("unknown word")
+    enter(page, "version")
+    expect(page.locator("#log li").first).to_contain_text("ninespring")
+    enter(page, "$defaults")  # ends telemetry on the board
+    expect(page.locator("#supply")).to_have_text("of 15.0 A")
+    before = float(page.inner_text("#time"))
+    until = time.monotonic() + 30.0
+    while float(page.inner_text("#time")) <= before + 1.0:
+        assert time.monotonic() < until
+        time.sleep(0.1)
+
+
+@on_a_page
+def test_one_click_records_a_log_that_can_be_read(page: Page, simulated: tuple[Dashboard, Path]) -> None:
+    page.click("#record")
+    expect(page.locator("#recording")).to_contain_text(re.compile(r": [1-9]\d rows"))
+    page.click("#record")
+    expect(page.locator("#log li").first).to_contain_text("rows in")
+    (log,) = simulated[1].glob("*.csv")
+    assert log.read_text().startswith("# recorded: ") and "\n# $loss_w_per_k=" in log.read_text()
+    assert read_log(log, 9, temperatures=False).duration_s > 0.9
 
 
 @on_a_page
