@@ -313,7 +313,7 @@ def test_what_only_leads_on_what_is_there_is_not_found_the_other_way_round(make_
     def apart(columns: dict[str, np.ndarray]) -> None:
         columns["t2_c"] = columns["t2_c"] + 0.08 * (columns["t2_c"] - columns["t3_c"])
 
-    found = diagnosed(make_log, seeds=(3,), change=apart)
+    found = diagnosed(make_log, seeds=(3,), change=apart, seconds=300)
     assert found["unexplained"] or found["effects"]
     assert all(one["size"] > 0 for one in found["unnamed"] if one["kind"] in unnamed.GIVES_ONLY)
 
