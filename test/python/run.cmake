@@ -5,8 +5,8 @@ if(missing)
     message(STATUS "SKIPPED: ninespring is not installed for ${PYTHON}: run script/setup")
     return()
 endif()
-# Plugins that are installed with other packages are imported for every file, Hypothesis's with all of it: a second of each.
-execute_process(COMMAND ${PYTHON} -m pytest -q -rs -p no:cacheprovider -p no:hypothesispytest -p no:anyio -m "${WHICH}" ${FILE}
+# Plugins that are installed with other packages are imported for every process, Hypothesis's with all of it: a second of each.
+execute_process(COMMAND ${PYTHON} -m pytest -q -rs -p no:cacheprovider -p no:hypothesispytest -p no:anyio -m "${WHICH}" ${FILES}
                 RESULT_VARIABLE failed)
 if(failed)
     message(FATAL_ERROR "pytest failed")
