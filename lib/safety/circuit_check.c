@@ -21,7 +21,8 @@
  * as others switch, adds half of it at the most. */
 #define SLOPE_SHARE 0.05f
 /* Deviation of a duty, of itself, at which voltages are still those of one duty. */
-#define STEADY_SHARE 0.15f
+#define STEADY_SHARE     0.15f
+#define STEADY_PER_SLOPE (STEADY_SHARE * STEADY_SHARE / (SLOPE_SHARE * SLOPE_SHARE))
 /* Off by more than the same tolerances, and the offsets of both readings. */
 #define BALANCE_SHARE 0.3f
 #define BALANCE_MV    15.0f
@@ -169,7 +170,7 @@ bool circuit_check_judge(circuit_check_t *c, const circuit_source_t *source, uin
         const float off_mv = found_mv - declared_mv;
         const float beyond_mv = fabsf(off_mv) - BALANCE_SHARE * declared_mv - BALANCE_MV;
         unbalanced = beyond_mv > (off_mv < 0.0f ? source->more_mv : source->less_mv);
-        const bool steady = variance < STEADY_SHARE * STEADY_SHARE * duty * duty;
+        const bool steady = variance < STEADY_PER_SLOPE * slope_variance;
         const float square_mv2 = share * (float)c->voltage_square;
         restless = flows && steady &&
                    moves_alone(square_mv2 - found_mv * found_mv, follows_mv, variance, found_mv);
