@@ -652,7 +652,9 @@ def test_what_is_not_known_yet_or_old_is_shown_as_that(browser: Browser, tmp_pat
         expect(page.locator("#hottest")).to_have_text("not known")
         expect(spring(page, 1, "temperature")).to_have_text("?")
         page.click("#cold")
+        begun_s = time.monotonic()
         while "model cold" not in board.sent():  # it is sent; the board may read it a moment later
+            assert time.monotonic() - begun_s < 10.0
             time.sleep(0.01)
         board.answers["model"] = ["ok"]
         expect(page.locator("#unknown")).to_be_hidden()
