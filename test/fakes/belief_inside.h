@@ -35,4 +35,38 @@ static inline spring_sights_t *sights_inside(spring_estimator_t *estimator)
     return &estimator->sights;
 }
 
+/* Another number in each place: it must be told where it belongs. */
+static inline spring_sight_t sight_with_numbers(uint8_t spring)
+{
+    return (spring_sight_t){.spring = spring,
+                            .kind = SPRING_SIGHT_LOST,
+                            .read = -132,
+                            .read_sd = 5,
+                            .believed = 24,
+                            .believed_sd = 18,
+                            .seen = -8,
+                            .seen_sd = 12,
+                            .now = 1,
+                            .now_sd = 10,
+                            .shift = 4,
+                            .loss = 120};
+}
+
+/* No other takes more room. */
+static inline spring_sight_t sight_of_most_digits(uint8_t spring)
+{
+    return (spring_sight_t){.spring = spring,
+                            .read = INT16_MIN,
+                            .read_sd = 255,
+                            .believed = -2550,
+                            .believed_sd = 255,
+                            .seen = -2550,
+                            .seen_sd = 255,
+                            .now = -2550,
+                            .now_sd = 255,
+                            .shift = -600,
+                            .loss = -9000,
+                            .did = 31};
+}
+
 #endif

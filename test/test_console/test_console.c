@@ -248,19 +248,14 @@ TEST(what_else_is_refused_changes_nothing_either)
     expect_error("on 1", CONSOLE_ERROR_FAULT);
     TEST_ASSERT_EQUAL_STRING("error:11 a fault is latched; see faults and type clear\r\n", said);
     expect_ok("clear");
+    /* a replay begins anew: a sensor that was found to lie would be believed, without a word */
+    safety_trip(&controller.safety, 4, SAFETY_FAULT_SENSOR_MISMATCH);
+    expect_error("telemetry inputs", CONSOLE_ERROR_FAULT);
+    expect_ok("clear");
     expect_ok("on 1");
     expect_error("selftest", CONSOLE_ERROR_SPRINGS_ON);
     expect_error("model cold", CONSOLE_ERROR_SPRINGS_ON);
     expect_error("telemetry inputs", CONSOLE_ERROR_SPRINGS_ON);
-}
-
-/* A replay begins anew: a sensor that was found to lie would be believed, without a word. */
-TEST(no_replay_begins_by_forgetting_a_fault)
-{
-    safety_trip(&controller.safety, 4, SAFETY_FAULT_SENSOR_MISMATCH);
-    expect_error("telemetry inputs", CONSOLE_ERROR_FAULT);
-    expect_ok("faults");
-    expect_said("spring 5: fault 15 sensor_mismatch");
 }
 
 /* It would begin everything anew, without a word, and believe hot springs of before power-on. */
@@ -596,20 +591,15 @@ TEST(selftest_gives_the_policy_back_also_when_it_is_stopped)
     TEST_ASSERT_EQUAL_UINT16(0, controller_level_permille(&controller, 0));
 }
 
-TEST(stop_drops_the_line_that_had_begun)
+TEST(nothing_is_said_without_room_and_a_stop_drops_what_had_begun)
 {
-    said_length = 0;
     type("on a");
     console_stop(&console);
     type("ll\n");
     TEST_ASSERT_EQUAL_STRING_LEN("error:12 ", said, 9);
     TEST_ASSERT_EQUAL_UINT(1, answers());
     TEST_ASSERT_EQUAL_UINT16(0, controller_level_permille(&controller, 0));
-    expect_ok("on 1"); /* what is typed afterwards counts again */
-}
-
-TEST(nothing_is_said_without_room_and_a_stop_ends_a_long_answer)
-{
+    forget();
     room = CONSOLE_ROOM_BYTES - 1u;
     TEST_ASSERT_FALSE(console_ready(&console));
     room = 60000;
@@ -625,18 +615,9 @@ TEST(nothing_is_said_without_room_and_a_stop_ends_a_long_answer)
     expect_said("error:12 ");
 }
 
-TEST(status_is_one_line)
+TEST(status_is_one_line_and_says_what_the_thermistor_cannot_mean)
 {
     expect_ok("model cold");
-    said_length = 0;
-    console_print_status(&console);
-    TEST_ASSERT_EQUAL_STRING_LEN("<off|t:0.000|sum_a:0.000|hottest_c:20.00@1|fan:0|fault:0|", said,
-                                 57);
-    TEST_ASSERT_EQUAL_PTR(said + said_length - 1u, strchr(said, '\n'));
-}
-
-TEST(what_the_thermistor_cannot_mean_is_said)
-{
     for (unsigned held = 0; held < 2; held++) {
         status.ambient_is_held = held != 0;
         expect_ok("faults");
@@ -645,6 +626,9 @@ TEST(what_the_thermistor_cannot_mean_is_said)
                               NULL);
         said_length = 0;
         console_print_status(&console);
+        TEST_ASSERT_EQUAL_STRING_LEN("<off|t:0.000|sum_a:0.000|hottest_c:20.00@1|fan:0|fault:0|",
+                                     said, 57);
+        TEST_ASSERT_EQUAL_PTR(said + said_length - 1u, strchr(said, '\n'));
         TEST_ASSERT_EQUAL(held != 0, strstr(said, "|ambient:held>\r\n") != NULL);
     }
 }
@@ -674,14 +658,7 @@ TEST(an_ambient_that_a_thermistor_overrules_says_so)
     TEST_ASSERT_EQUAL_INT16(2600, settings.board.ambient_cc);
 }
 
-TEST(without_a_cut_off_the_supply_says_why_it_is_refused)
-{
-    expect_ok("$cut_off=0");
-    expect_error("supply off", CONSOLE_ERROR_NOT_AVAILABLE);
-    TEST_ASSERT_EQUAL_STRING(
-        "error:15 not available on this board: by cut_off=0 no relay is fitted\r\n", said);
-}
-
+/* And without a cut-off what may be switched says why it is refused. */
 TEST(status_says_whether_the_stages_have_their_supply)
 {
     const char *const lines[] = {"supply on", "supply off", "$cut_off=0", "$cut_off=1"};
@@ -694,6 +671,10 @@ TEST(status_says_whether_the_stages_have_their_supply)
         console_print_status(&console);
         TEST_ASSERT_EQUAL_STRING(ends[k], said + said_length - strlen(ends[k]));
     }
+    expect_ok("$cut_off=0");
+    expect_error("supply off", CONSOLE_ERROR_NOT_AVAILABLE);
+    TEST_ASSERT_EQUAL_STRING(
+        "error:15 not available on this board: by cut_off=0 no relay is fitted\r\n", said);
 }
 
 TEST(model_says_with_which_bounds)
@@ -803,22 +784,10 @@ TEST(why_says_the_last_sights_of_a_spring_in_words)
     sight->did = SPRING_DID_HEAT;
     (void)spring_sights_add(sights, 3); /* of another spring */
     sights->turn = 481;
-    *(sight = spring_sights_add(sights, 4)) =
-        (spring_sight_t){.number = 2,
-                         .turn = 481,
-                         .spring = 4,
-                         .kind = SPRING_SIGHT_LOST,
-                         .read = -132,
-                         .read_sd = 5,
-                         .believed = 24,
-                         .believed_sd = 18,
-                         .seen = -8,
-                         .seen_sd = 12,
-                         .now = 1,
-                         .now_sd = 10,
-                         .shift = 4,
-                         .loss = 120,
-                         .did = SPRING_DID_OPEN | SPRING_DID_BLIND};
+    *(sight = spring_sights_add(sights, 4)) = sight_with_numbers(4);
+    sight->number = 2;
+    sight->turn = 481;
+    sight->did = SPRING_DID_OPEN | SPRING_DID_BLIND;
     sights->turn = 500;
     ask_at_once("WHY 5");
     TEST_ASSERT_EQUAL_STRING(
@@ -860,24 +829,13 @@ TEST(why_goes_on_with_what_is_left_where_sights_give_way)
 TEST(the_longest_why_fits_its_lines)
 {
     spring_sight_t *const sight = spring_sights_add(sights_inside(&controller.estimator), 8);
-    *sight = (spring_sight_t){.spring = 8,
-                              .read = -32767,
-                              .believed = -1234,
-                              .seen = -1234,
-                              .now = -1234,
-                              .shift = -600,
-                              .loss = -9000,
-                              .did = 31,
-                              .read_sd = 255,
-                              .believed_sd = 255,
-                              .seen_sd = 255,
-                              .now_sd = 255};
+    *sight = sight_of_most_digits(8);
     for (uint8_t kind = 0; kind < SPRING_SIGHT_KINDS; kind++) {
         sight->kind = kind;
         sights_inside(&controller.estimator)->turn = SPRING_SIGHTS_TURNS;
         ask_at_once("why 9");
         expect_said("than predicted (sd 2.55)\r\n");
-        expect_said("now 123.4 K below (sd 25.5)\r\n");
+        expect_said("now 255.0 K below (sd 25.5)\r\n");
         expect_said("phase seems to be missing\r\nok\r\n");
     }
 }

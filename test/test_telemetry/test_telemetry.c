@@ -199,17 +199,10 @@ TEST(csv_tells_each_sight_once_when_it_is_known_what_was_done)
                 "0.0|loss:0.00>\r\n");
     forget();
     spring_sight_t *const sight = spring_sights_add(sights_inside(&controller.estimator), 4);
-    sight->kind = SPRING_SIGHT_LOST;
-    sight->read = -132;
-    sight->read_sd = 5;
-    sight->believed = 24;
-    sight->believed_sd = 18;
-    sight->seen = -8;
-    sight->seen_sd = 12;
-    sight->now = 1;
-    sight->now_sd = 10;
-    sight->shift = 4;
-    sight->loss = 120;
+    const spring_sight_t added = *sight;
+    *sight = sight_with_numbers(4);
+    sight->number = added.number;
+    sight->turn = added.turn;
     pass(1);
     ticks(50, 12000);
     TEST_ASSERT_EQUAL_UINT(0, occurrences("<"));
@@ -232,20 +225,11 @@ TEST(longest_sight_is_told_whole_and_waits_for_room)
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 1));
     ticks(50, 0); /* the first row */
     forget();
-    *spring_sights_add(sights, 8) = (spring_sight_t){.number = sights->numbers - 1u,
-                                                     .spring = 8,
-                                                     .kind = SPRING_SIGHT_TRANSFORMS,
-                                                     .did = 15,
-                                                     .read = INT16_MIN,
-                                                     .read_sd = 255,
-                                                     .believed_sd = 255,
-                                                     .believed = -2550,
-                                                     .seen = -2550,
-                                                     .seen_sd = 255,
-                                                     .now_sd = 255,
-                                                     .now = -2550,
-                                                     .shift = -600,
-                                                     .loss = -9000};
+    spring_sight_t *const sight = spring_sights_add(sights, 8);
+    *sight = sight_of_most_digits(8);
+    sight->number = sights->numbers - 1u;
+    sight->kind = SPRING_SIGHT_TRANSFORMS;
+    sight->did = 15;
     pass(2);
     for (unsigned tick = 0; tick < 10; tick++) {
         room = 150;

@@ -112,30 +112,36 @@ static void declare(float loss, float capacity)
     declare_scaled(loss, capacity, 1.0f);
 }
 
-/* A scale is of the latent heat, too: beside a twin to which none was declared, no spring that
- * transforms is colder. */
+/* Beside a twin to which nothing was declared, and that goes first, it is at most so much colder or
+ * hotter at the same moment. */
+static void expect_beside_twin(bool is_twin, int moment, float colder_k, float hotter_k)
+{
+    static float twin_c[60];
+    const float c = temperature_ceiling_c(&ceiling, 4);
+    twin_c[moment] = is_twin ? c : twin_c[moment];
+    TEST_ASSERT_TRUE(c > twin_c[moment] - colder_k);
+    TEST_ASSERT_TRUE(c < twin_c[moment] + hotter_k);
+}
+
+#define HOWEVER_HOT 1000.0f
+
+/* A scale is of the latent heat, too: no spring that transforms is colder. */
 TEST(a_scale_that_is_declared_to_a_warm_spring_takes_no_more_latent_heat)
 {
-    float twin_c[30];
     for (int twin = 1; twin >= 0; twin--) {
         setUp();
         run(0.6f, 600000u, 12.0f);
         declare_scaled(1.0f, 1.0f, twin ? 1.0f : 3.0f);
         for (int m = 0; m < 30; m++) {
             run(0.6f, 600000u, 6.0f);
-            if (twin) {
-                twin_c[m] = temperature_ceiling_c(&ceiling, 4);
-            }
-            TEST_ASSERT_FLOAT_WITHIN(3.0f, twin_c[m], temperature_ceiling_c(&ceiling, 4));
+            expect_beside_twin(twin, m, 3.0f, 3.0f);
         }
     }
 }
 
-/* What it took up it gives back, whatever is declared then: beside a twin to which nothing was, no
- * spring that cools is colder. */
+/* What it took up it gives back, whatever is declared then: no spring that cools is colder. */
 TEST(a_warm_spring_gives_back_the_latent_heat_that_it_took_up)
 {
-    float twin_c[20];
     for (int twin = 1; twin >= 0; twin--) {
         setUp();
         run(0.6f, 600000u, 180.0f);
@@ -143,17 +149,14 @@ TEST(a_warm_spring_gives_back_the_latent_heat_that_it_took_up)
         declare(1.0f, twin ? 1.0f : 1.5f);
         for (int m = 0; m < 20; m++) {
             run(0.0f, 0u, 6.0f);
-            if (twin) {
-                twin_c[m] = temperature_ceiling_c(&ceiling, 4);
-            }
-            TEST_ASSERT_TRUE(temperature_ceiling_c(&ceiling, 4) > twin_c[m] - 1.0f);
+            expect_beside_twin(twin, m, 1.0f, HOWEVER_HOT);
         }
     }
 }
 
-/* Heated, then driven on for as long, beside a twin to which nothing was declared: what is declared
- * makes no warm spring colder, however often it arrives; but hotter, if it is. Of a larger heat
- * capacity it is hotter by as much as it then counts less latent heat, all of which is 29 K. */
+/* Heated, then driven on for as long: what is declared makes no warm spring colder, however often
+ * it arrives; but hotter, if it is. Of a larger heat capacity it is hotter by as much as it then
+ * counts less latent heat, all of which is 29 K. */
 TEST(of_warm_springs_the_more_careful_numbers_count)
 {
     static const struct {
@@ -161,7 +164,7 @@ TEST(of_warm_springs_the_more_careful_numbers_count)
     } row[] = {{1.4f, 1.0f, 1.0f, 1.0f}, {3.4f, 1.0f, 1.0f, 1.0f}, {1.0f, 10.0f, 1.0f, 1.0f},
                {3.4f, 4.0f, 1.0f, 1.0f}, {0.8f, 1.0f, 0.8f, 1.0f}, {1.0f, 0.5f, 1.0f, 0.5f}};
     for (unsigned n = 0; n < ROWS(row); n++) {
-        float twin_c[60];
+        const float hotter_k = row[n].capacity > row[n].twin_capacity ? 29.0f : 3.0f;
         for (int twin = 1; twin >= 0; twin--) {
             setUp();
             run(0.6f, 600000u, 60.0f);
@@ -171,54 +174,57 @@ TEST(of_warm_springs_the_more_careful_numbers_count)
                             twin ? row[n].twin_capacity : row[n].capacity);
                 }
                 run(m < 20 ? 0.0f : 0.6f, m < 20 ? 0u : 600000u, 6.0f);
-                if (twin) {
-                    twin_c[m] = temperature_ceiling_c(&ceiling, 4);
-                }
-                const float c = temperature_ceiling_c(&ceiling, 4);
-                TEST_ASSERT_TRUE(c > twin_c[m] - 3.0f);
-                TEST_ASSERT_TRUE(c < twin_c[m] +
-                                         (row[n].capacity > row[n].twin_capacity ? 29.0f : 3.0f));
+                expect_beside_twin(twin, m, 3.0f, hotter_k);
             }
         }
     }
 }
 
-/* A plate, neighbours or a latent heat that are said to take more, at any moment of a heating:
- * beside a twin to which nothing was said no spring is colder, driven alone or beside the others;
- * taken back, all is as before. */
+/* These numbers are declared at a moment of a heating, or not, and the fan goes on at another. */
+static void heat_beside_twin(const thermal_model_parameters_t *now, int when, bool alone,
+                             uint8_t before_percent, uint8_t then_percent)
+{
+    for (int twin = 1; twin >= 0; twin--) {
+        setUp();
+        thermal_model_set_fan(&model, before_percent);
+        for (int m = 0; m < 60; m++) {
+            for (int turn = 0; turn < 10; turn++) {
+                for (uint8_t k = 0; k < 9; k++) {
+                    temperature_ceiling_step(&ceiling, &model, k, k == 4 || !alone ? 0.6f : 0.0f);
+                }
+            }
+            if (m == when && !twin) {
+                declare_model(now);
+            }
+            if (m == when + 1) {
+                thermal_model_set_fan(&model, then_percent);
+            }
+            expect_beside_twin(twin, m, 3.0f, HOWEVER_HOT);
+        }
+    }
+    declare_model(&parameters);
+    TEST_ASSERT_UINT16_WITHIN(66, WHOLE, ceiling.loss_share[4]);
+}
+
+static thermal_model_parameters_t with_plate(uint16_t coupling_uw_per_k)
+{
+    thermal_model_parameters_t now = parameters;
+    now.plate_coupling_uw_per_k = coupling_uw_per_k;
+    now.plate_heat_capacity_mj_per_k = 2000000;
+    now.plate_loss_uw_per_k = 65535;
+    return now;
+}
+
+/* A plate, neighbours or a latent heat that are said to take more, at any moment of a heating: no
+ * spring is colder, driven alone or beside the others; taken back, all is as before. */
 TEST(what_else_is_said_to_take_heat_takes_no_more_of_a_warm_spring)
 {
     for (unsigned n = 0; n < 16u; n++) {
-        thermal_model_parameters_t now = parameters;
-        now.plate_coupling_uw_per_k = n % 4u == 0 ? 50000 : 0;
-        now.plate_heat_capacity_mj_per_k = 2000000;
-        now.plate_loss_uw_per_k = 65535;
+        thermal_model_parameters_t now = with_plate(n % 4u == 0 ? 50000 : 0);
         now.orthogonal_uw_per_k = n % 4u == 1 ? 12000 : parameters.orthogonal_uw_per_k;
         now.diagonal_uw_per_k = n % 4u == 2 ? 12000 : parameters.diagonal_uw_per_k;
         now.latent_heat_mj = n % 4u == 3 ? 23800 : parameters.latent_heat_mj;
-        const bool alone = n / 4u % 2u != 0;
-        const int when = n < 8u ? 1 : 20;
-        float twin_c[60];
-        for (int twin = 1; twin >= 0; twin--) {
-            setUp();
-            for (int m = 0; m < 60; m++) {
-                for (int turn = 0; turn < 10; turn++) {
-                    for (uint8_t k = 0; k < 9; k++) {
-                        temperature_ceiling_step(&ceiling, &model, k,
-                                                 k == 4 || !alone ? 0.6f : 0.0f);
-                    }
-                }
-                if (m == when && !twin) {
-                    declare_model(&now);
-                }
-                if (twin) {
-                    twin_c[m] = temperature_ceiling_c(&ceiling, 4);
-                }
-                TEST_ASSERT_TRUE(temperature_ceiling_c(&ceiling, 4) > twin_c[m] - 3.0f);
-            }
-        }
-        declare_model(&parameters);
-        TEST_ASSERT_UINT16_WITHIN(66, WHOLE, ceiling.loss_share[4]);
+        heat_beside_twin(&now, n < 8u ? 1 : 20, n / 4u % 2u != 0, 0, 0);
         TEST_ASSERT_UINT16_WITHIN(66, WHOLE, ceiling.capacity_share[4]);
     }
 }
@@ -234,38 +240,12 @@ TEST(what_a_fan_is_said_to_take_counts_before_it_is_told)
                {11300, 658, 329, 900, 0, 0, 50},     {11300, 658, 329, 900, 0, 100, 50},
                {11300, 658, 329, 500, 50000, 100, 0}};
     for (unsigned n = 0; n < ROWS(row); n++) {
-        thermal_model_parameters_t now = parameters;
+        thermal_model_parameters_t now = with_plate(row[n].plate_uw);
         now.loss_fan_uw_per_k = row[n].loss_uw;
         now.orthogonal_fan_uw_per_k = row[n].orthogonal_uw;
         now.diagonal_fan_uw_per_k = row[n].diagonal_uw;
         now.fan_half_share_permille = row[n].half_permille;
-        now.plate_coupling_uw_per_k = row[n].plate_uw;
-        now.plate_heat_capacity_mj_per_k = 2000000;
-        now.plate_loss_uw_per_k = 65535;
-        float twin_c[60];
-        for (int twin = 1; twin >= 0; twin--) {
-            setUp();
-            thermal_model_set_fan(&model, row[n].before_percent);
-            for (int m = 0; m < 60; m++) {
-                for (int turn = 0; turn < 10; turn++) {
-                    for (uint8_t k = 0; k < 9; k++) {
-                        temperature_ceiling_step(&ceiling, &model, k, k == 4 ? 0.6f : 0.0f);
-                    }
-                }
-                if (m == 10 && !twin) {
-                    declare_model(&now);
-                }
-                if (m == 11) {
-                    thermal_model_set_fan(&model, row[n].then_percent);
-                }
-                if (twin) {
-                    twin_c[m] = temperature_ceiling_c(&ceiling, 4);
-                }
-                TEST_ASSERT_TRUE(temperature_ceiling_c(&ceiling, 4) > twin_c[m] - 3.0f);
-            }
-        }
-        declare_model(&parameters);
-        TEST_ASSERT_UINT16_WITHIN(66, WHOLE, ceiling.loss_share[4]);
+        heat_beside_twin(&now, 10, true, row[n].before_percent, row[n].then_percent);
     }
 }
 
