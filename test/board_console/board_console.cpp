@@ -153,6 +153,25 @@ TEST(an_eeprom_that_keeps_nothing_fails_the_save)
     mega->expect_error("$save", CONSOLE_ERROR_SAVE_FAILED);
 }
 
+/* At once and while springs are driven, without a fault. */
+TEST(averaging_is_set_while_it_runs)
+{
+    auto mega = booted();
+    mega->expect_ok("on all");
+    mega->run_ms(500.0);
+    for (const char *samples : {"16", "8"}) {
+        mega->expect_ok(std::string("$sensor_averaging=") + samples);
+        mega->run_ms(300.0);
+        const board_view_t seen = mega->view();
+        for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
+            TEST_ASSERT_EQUAL_HEX16(samples[0] == '8' ? 0x1DDF : 0x1E67,
+                                    board_sensor_register(mega->raw(), k, 0));
+            TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, seen.spring[k].fault);
+            TEST_ASSERT_INT_WITHIN(60, 1500, seen.spring[k].measured_ma);
+        }
+    }
+}
+
 TEST(selftest_wants_and_leaves_everything_off_and_finds_what_is_beyond_its_limits)
 {
     auto mega = booted();

@@ -30,9 +30,9 @@ at 15 = off all
 SETTINGS = "# not written: loss\n$heat_capacity_j_per_k=3.000\n\n$rows=3\n"
 
 
-def rows_of(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as stream:
-        return list(csv.DictReader(line for line in stream if not line.startswith("#")))
+def rows_of_text(content: bytes) -> list[dict[str, str]]:
+    lines = [line for line in content.decode().splitlines() if not line.startswith("#")]
+    return list(csv.DictReader(lines))
 
 
 # One thing after the other; what the rows after it show is in Run.test_events_do_what_they_say.
@@ -208,7 +208,7 @@ class Arguments(Case):
 class Paper(Case):
     def test_comsol_within_one_and_a_half_degrees(self) -> None:
         table = self.works("paper", "-o", self.output, "--json", self.json)
-        rows = rows_of(self.output)
+        rows = rows_of_text(self.output.read_bytes())
         self.assertEqual(list(rows[0]), ["pitch_mm", "fan", "source", "t_hot_c", "t_centre_c", "model_centre_c"])
         comsol = {
             (float(row["pitch_mm"]), float(row["fan"])): float(row["model_centre_c"])
@@ -238,6 +238,9 @@ class Run(Case):
         self.works("run", path.name, "-o", output, *more)
         return output.read_bytes()
 
+    def rows_of_run(self, name: str, *more: object, scenario: str = SCENARIO) -> list[dict[str, str]]:
+        return rows_of_text(self.run_it(name, *more, scenario=scenario))
+
     def test_same_seed_same_bytes(self) -> None:
         first = self.run_it("a.csv")
         self.assertEqual(first, self.run_it("b.csv"))
@@ -245,8 +248,7 @@ class Run(Case):
         self.assertNotEqual(first, self.run_it("d.csv", "--seed", 6))
 
     def test_the_log_has_every_column_that_the_documents_name(self) -> None:
-        self.run_it("a.csv", "--json", self.json)
-        rows = rows_of(self.folder / "a.csv")
+        rows = self.rows_of_run("a.csv", "--json", self.json)
         self.assertEqual(len(rows), 41)
         self.assertEqual(rows[0]["time_s"], "0.00")
         self.assertEqual(rows[-1]["time_s"], "20.00")
@@ -274,13 +276,13 @@ class Run(Case):
         self.assertLess(json.loads(self.json.read_text())["rmse_c"], 0.3)
 
     def test_set_acts_as_the_file_would(self) -> None:
-        first = rows_of_text(self.run_it("a.csv"))
-        warmer = rows_of_text(self.run_it("b.csv", "--set", "ambient_c=30"))
+        first = self.rows_of_run("a.csv")
+        warmer = self.rows_of_run("b.csv", "--set", "ambient_c=30")
         self.assertAlmostEqual(float(first[0]["p1_c"]), 20.0, delta=0.01)
         self.assertAlmostEqual(float(warmer[0]["p1_c"]), 30.0, delta=0.01)
-        chip = rows_of_text(self.run_it("c.csv", "--set", "chip.open_current_a=0.5"))
+        chip = self.rows_of_run("c.csv", "--set", "chip.open_current_a=0.5")
         self.assertAlmostEqual(float(chip[20]["i1_a"]), 0.5, delta=0.01)
-        short = rows_of_text(self.run_it("d.csv", "--set", "scenario.duration_s=16"))
+        short = self.rows_of_run("d.csv", "--set", "scenario.duration_s=16")
         self.assertEqual(short[-1]["time_s"], "16.00")
 
     def test_one_spring_s_value_holds_wherever_it_stands(self) -> None:
@@ -288,11 +290,11 @@ class Run(Case):
         first = self.run_it("a.csv", *one, *every)
         rows = rows_of_text(first)
         self.assertLess(float(rows[-1]["p1_c"]), float(rows[-1]["p3_c"]) - 1)
-        self.assertEqual(rows, rows_of_text(self.run_it("b.csv", *every, *one)))
+        self.assertEqual(rows, self.rows_of_run("b.csv", *every, *one))
 
     def test_pitch_decides_what_the_centre_gets(self) -> None:
-        near = rows_of_text(self.run_it("a.csv", "--set", "array.pitch_mm=4"))
-        far = rows_of_text(self.run_it("b.csv", "--set", "array.pitch_mm=6"))
+        near = self.rows_of_run("a.csv", "--set", "array.pitch_mm=4")
+        far = self.rows_of_run("b.csv", "--set", "array.pitch_mm=6")
         self.assertGreater(float(near[-1]["p5_c"]), float(far[-1]["p5_c"]) + 0.1)
 
     def test_an_open_spring_is_found_and_told(self) -> None:
@@ -302,14 +304,14 @@ class Run(Case):
 
     def test_what_looks_right_and_is_not(self) -> None:
         events = "at 3 = fail freeze 1\nat 3 = fail lie 2 0.8 1.1\nat 3 = fail swap 4 9\nat 4 = ambient 35\n"
-        rows = rows_of_text(self.run_it("a.csv", scenario=SCENARIO + events))
+        rows = self.rows_of_run("a.csv", scenario=SCENARIO + events)
         self.assertEqual(len({row["i1_a"] for row in rows[7:28]}), 1)  # noise moves the others
         self.assertGreater(len({row["i3_a"] for row in rows[7:28]}), 3)
         self.assertEqual(rows[12]["ambient_c"], "35.000")
 
     def test_a_load_and_a_contact_in_mid_run(self) -> None:
         plant = SCENARIO.replace("resistance_phase", "contact_resistance, transformation_shift")
-        rows = rows_of_text(self.run_it("a.csv", scenario=plant + "at 8 = set contact_ohm[3] 0.05\n"))
+        rows = self.rows_of_run("a.csv", scenario=plant + "at 8 = set contact_ohm[3] 0.05\n")
         ohm = [float(row["v3_v"]) / float(row["i3_a"]) for row in (rows[15], rows[20])]
         self.assertAlmostEqual(ohm[1] - ohm[0], 0.05, delta=0.008)  # 4 mV steps at 1 A
         refused = self.scenario_refused
@@ -325,7 +327,7 @@ class Run(Case):
         )
         wide += "[plant]\neffects = latent_heat, resistance_phase\n[chip]\nopen_current_a = 1.5\n"
         wide += "[board.2]\nopen_current_a = 1\n[events]\nat 1 = pattern 11111101\n"
-        last = rows_of_text(self.run_it("a.csv", scenario=wide))[-2]
+        last = self.rows_of_run("a.csv", scenario=wide)[-2]
         for spring, current_a in ((1, 1.5), (2, 1.5), (3, 1.0), (4, 1.0), (5, 1.5), (6, 1.5), (7, 0.0), (8, 1.0)):
             self.assertAlmostEqual(float(last[f"i{spring}_a"]), current_a, delta=0.05)
         self.scenario_refused("s.ini:17:", "on two boards", wide + "at 2 = fail swap 1 3\n")
@@ -344,10 +346,10 @@ class Run(Case):
         scenario = scenario.replace("= 1.5", "= 2.8").replace("= 0.5", "= 4").replace("at 15", "at 26")
         scenario = scenario.replace("at 1 = pattern 111101111", "at 2 = on 1")
         more = ("--json", self.json, "--set", "scenario.duration_s=40.3")
-        coarse = rows_of_text(self.run_it("a.csv", *more, scenario=scenario))
+        coarse = self.rows_of_run("a.csv", *more, scenario=scenario)
         first = json.loads(self.json.read_text())["springs"][0]
         self.assertEqual(coarse[-1]["time_s"], "40.30")
-        fine = rows_of_text(self.run_it("b.csv", *more, "--set", "scenario.log_interval_s=0.02", scenario=scenario))
+        fine = self.rows_of_run("b.csv", *more, "--set", "scenario.log_interval_s=0.02", scenario=scenario)
         self.assertEqual(json.loads(self.json.read_text())["springs"][0], first)
 
         # v i of a row is the mean power until the next, also where the current was on for half of the row.
@@ -377,7 +379,7 @@ class Run(Case):
             spread = {}
             for noise in ("0", "0.2"):
                 runs = [
-                    rows_of_text(self.run_it("a.csv", "--seed", seed, scenario=scenario.format(f"{key} = {noise}")))
+                    self.rows_of_run("a.csv", "--seed", seed, scenario=scenario.format(f"{key} = {noise}"))
                     for seed in (3, 4)
                 ]
                 both = [[float(row[column]) for row in run[10:]] for run in runs]
@@ -386,7 +388,7 @@ class Run(Case):
             self.assertGreater(spread["0.2"], 0.005, key)
 
     def test_events_do_what_they_say(self) -> None:
-        rows = rows_of_text(self.run_it("a.csv", "--json", self.json, scenario=EVENTS))
+        rows = self.rows_of_run("a.csv", "--json", self.json, scenario=EVENTS)
         result = json.loads(self.json.read_text())
 
         def targets(second: int) -> str:
@@ -408,7 +410,7 @@ class Run(Case):
         self.assertEqual(result["board_fault"], "emergency_stop")
 
     def test_limits_and_what_they_cut_are_columns(self) -> None:
-        rows = rows_of_text(self.run_it("a.csv", "--policy", "precompensate"))
+        rows = self.rows_of_run("a.csv", "--policy", "precompensate")
         self.assertEqual({rows[1][f"limits{k}"] for k in range(1, 10)}, {"0"})
         # 14.8 A are four boosts of 3 A and most of a fifth: the supply limits that one and the three that wait.
         waiting = [k for k in range(1, 10) if int(rows[8][f"limits{k}"]) & 4]
@@ -419,8 +421,8 @@ class Run(Case):
 
     def test_a_fan_that_stands_does_not_cool(self) -> None:
         scenario = SCENARIO + "at 2 = fan 100\n{}"
-        cooled = rows_of_text(self.run_it("a.csv", scenario=scenario.format("")))
-        stands = rows_of_text(self.run_it("b.csv", scenario=scenario.format("at 3 = fail fan_stop\n")))
+        cooled = self.rows_of_run("a.csv", scenario=scenario.format(""))
+        stands = self.rows_of_run("b.csv", scenario=scenario.format("at 3 = fail fan_stop\n"))
         again = rows_of_text(
             self.run_it("c.csv", scenario=scenario.format("at 3 = fail fan_stop\nat 4 = repair fan_stop\n"))
         )
@@ -431,7 +433,7 @@ class Run(Case):
 
     def test_policy_from_the_command_line_the_file_and_an_event(self) -> None:
         def targets(text: str, *more: object) -> list[str]:
-            return [row["s1_a"] for row in rows_of_text(self.run_it("a.csv", *more, scenario=text))]
+            return [row["s1_a"] for row in self.rows_of_run("a.csv", *more, scenario=text)]
 
         named = SCENARIO.replace("policy = open", "policy = precompensate")
         precompensate = targets(named)
@@ -445,7 +447,7 @@ class Run(Case):
     def test_a_file_of_settings_is_what_the_chip_believes(self) -> None:
         told = SCENARIO.replace("[chip]", "[chip]\nmodel = fitted.txt")
         self.file("fitted.txt", SETTINGS)
-        rows = rows_of_text(self.run_it("a.csv", scenario=told))
+        rows = self.rows_of_run("a.csv", scenario=told)
         self.assertLess(float(rows[-1]["m1_c"]), float(rows[-1]["p1_c"]) - 10)
         for line, place, said in (
             ("$rows=1\n", "s.ini:9:9: ", "is of 1 x 3 springs, the scenario of 3 x 3"),
@@ -517,11 +519,6 @@ class BadScenario(Case):
     def test_a_log_that_memory_could_not_hold(self) -> None:
         long = SCENARIO.replace("= 20", "= 1000000").replace("= 0.5", "= 0.02")
         self.scenario_refused("s.ini:1:1: ", "make log_interval_s longer", long)
-
-
-def rows_of_text(content: bytes) -> list[dict[str, str]]:
-    lines = [line for line in content.decode().splitlines() if not line.startswith("#")]
-    return list(csv.DictReader(lines))
 
 
 if __name__ == "__main__":

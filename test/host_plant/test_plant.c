@@ -132,19 +132,14 @@ TEST(every_bad_parameter_is_refused_and_changes_nothing)
 
 TEST(per_spring_values_stay_with_their_spring)
 {
-    double value;
     const double standard = get("loss_w_per_k");
     set("loss_w_per_k[9]", 0.01);
-    OK(plant_get(plant, "loss_w_per_k[9]", &value));
-    TEST_ASSERT_EQUAL_DOUBLE(0.01, value);
-    OK(plant_get(plant, "loss_w_per_k[8]", &value));
-    TEST_ASSERT_EQUAL_DOUBLE(standard, value);
+    TEST_ASSERT_EQUAL_DOUBLE(0.01, get("loss_w_per_k[9]"));
+    TEST_ASSERT_EQUAL_DOUBLE(standard, get("loss_w_per_k[8]"));
     OK(plant_set_index(plant, (size_t)plant_parameter_index("loss_w_per_k"), 8, 0.02));
-    OK(plant_get(plant, "loss_w_per_k[9]", &value));
-    TEST_ASSERT_EQUAL_DOUBLE(0.02, value);
+    TEST_ASSERT_EQUAL_DOUBLE(0.02, get("loss_w_per_k[9]"));
     set("loss_w_per_k", 0.03);
-    OK(plant_get(plant, "loss_w_per_k[9]", &value));
-    TEST_ASSERT_EQUAL_DOUBLE(0.03, value);
+    TEST_ASSERT_EQUAL_DOUBLE(0.03, get("loss_w_per_k[9]"));
 }
 
 TEST(transformation_temperatures_out_of_order_stop_the_step)
@@ -243,32 +238,27 @@ TEST(a_log_in_one_call_equals_the_same_by_steps)
     plant_destroy(other);
 }
 
+static void refuses_log(plant_status_t status, double *value, double bad)
+{
+    const double good = *value;
+    *value = bad;
+    TEST_ASSERT_EQUAL_INT(status, plant_simulate(plant, LOG_ROWS, log_time, log_mode, log_drive,
+                                                 log_fan, log_ambient, shown[0], NULL));
+    *value = good;
+}
+
 TEST(a_bad_log_is_refused_whole)
 {
     make_log(PLANT_DRIVE_POWER, 0.8, 4);
     shown[0][0] = -1.0;
-    const double good_time = log_time[599], good_drive = log_drive[4000];
-    log_time[599] = log_time[598];
-    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_TIME, plant_simulate(plant, LOG_ROWS, log_time, log_mode,
-                                                           log_drive, NULL, NULL, shown[0], NULL));
-    log_time[599] = (double)NAN;
-    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_TIME, plant_simulate(plant, LOG_ROWS, log_time, log_mode,
-                                                           log_drive, NULL, NULL, shown[0], NULL));
-    log_time[599] = good_time;
-    log_drive[4000] = -100.1;
-    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE, plant_simulate(plant, LOG_ROWS, log_time, log_mode,
-                                                            log_drive, NULL, NULL, shown[0], NULL));
-    log_drive[4000] = good_drive;
-    log_fan[599] = 2.0;
-    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE,
-                          plant_simulate(plant, LOG_ROWS, log_time, log_mode, log_drive, log_fan,
-                                         NULL, shown[0], NULL));
-    log_ambient[599] = 99.0;
-    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE,
-                          plant_simulate(plant, LOG_ROWS, log_time, log_mode, log_drive, NULL,
-                                         log_ambient, shown[0], NULL));
+    refuses_log(PLANT_ERROR_TIME, &log_time[599], log_time[598]);
+    refuses_log(PLANT_ERROR_TIME, &log_time[599], (double)NAN);
+    refuses_log(PLANT_ERROR_RANGE, &log_drive[4000], -100.1);
+    refuses_log(PLANT_ERROR_RANGE, &log_fan[599], 2.0);
+    refuses_log(PLANT_ERROR_RANGE, &log_ambient[599], 99.0);
     TEST_ASSERT_EQUAL_DOUBLE(-1.0, shown[0][0]);
     TEST_ASSERT_EQUAL_DOUBLE(0.0, plant_time_s(plant));
+    OK(plant_simulate(plant, LOG_ROWS, log_time, log_mode, log_drive, NULL, NULL, shown[0], NULL));
 }
 
 TEST(reset_starts_anew)

@@ -4,21 +4,6 @@
 #include "crc16.h"
 #include "hil_frame.h"
 
-static hil_frame_sensors_t some_sensors(void)
-{
-    hil_frame_sensors_t sensors;
-    memset(&sensors, 0, sizeof sensors);
-    sensors.tick = 0xBEEF;
-    sensors.ambient_c7 = -640;
-    sensors.springs = 9;
-    for (uint8_t k = 0; k < 9; k++) {
-        sensors.sensor[k].status = (uint8_t)(k % 5);
-        sensors.sensor[k].current_ma = (int16_t)(1500 - 333 * k);
-        sensors.sensor[k].voltage_mv = (int16_t)(-7 + 40 * k);
-    }
-    return sensors;
-}
-
 static hil_frame_decoder_t decoder;
 static hil_frame_sensors_t sent; /* and as a line: */
 static char line[HIL_FRAME_MAX_LINE];
@@ -30,7 +15,15 @@ void setUp(void)
     memset(&decoder, was, sizeof decoder);
     was = 1 - was;
     hil_frame_decoder_init(&decoder);
-    sent = some_sensors();
+    memset(&sent, 0, sizeof sent);
+    sent.tick = 0xBEEF;
+    sent.ambient_c7 = -640;
+    sent.springs = 9;
+    for (uint8_t k = 0; k < 9; k++) {
+        sent.sensor[k].status = (uint8_t)(k % 5);
+        sent.sensor[k].current_ma = (int16_t)(1500 - 333 * k);
+        sent.sensor[k].voltage_mv = (int16_t)(-7 + 40 * k);
+    }
     length = hil_frame_encode_sensors(&sent, line);
 }
 
@@ -145,12 +138,10 @@ TEST(console_lines_pass_by)
 
 TEST(wrong_number_of_springs_is_refused)
 {
-    hil_frame_duties_t duties = {.springs = 10};
-    sent.springs = 0;
-    TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_sensors(&sent, line));
-    sent.springs = 10;
-    TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_sensors(&sent, line));
-    TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_duties(&duties, line));
-    duties.springs = 0;
-    TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_duties(&duties, line));
+    for (uint8_t springs = 0; springs <= 10; springs = (uint8_t)(springs + 10u)) {
+        const hil_frame_duties_t duties = {.springs = springs};
+        sent.springs = springs;
+        TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_sensors(&sent, line));
+        TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_duties(&duties, line));
+    }
 }

@@ -40,22 +40,14 @@ static void take_defaults(uint8_t part)
     }
 }
 
-/* Highest and lowest that a field of that type can hold at all. */
-static int32_t most_of(uint8_t type)
-{
-    return type == PARAMETER_U8    ? 255
-           : type == PARAMETER_U16 ? 65535
-           : type == PARAMETER_S16 ? 32767
-                                   : INT32_MAX;
-}
-
-static int32_t least_of(uint8_t type)
-{
-    return type == PARAMETER_S16 ? -32768 : 0;
-}
-
 TEST(each_value_is_kept_at_its_limits_and_refused_beyond)
 {
+    /* what a field of that type can hold at all */
+    static const int32_t least_of[] = {[PARAMETER_S16] = INT16_MIN, [PARAMETER_U32] = 0};
+    static const int32_t most_of[] = {[PARAMETER_U8] = UINT8_MAX,
+                                      [PARAMETER_U16] = UINT16_MAX,
+                                      [PARAMETER_S16] = INT16_MAX,
+                                      [PARAMETER_U32] = INT32_MAX};
     for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
         const parameter_row_t row = parameter_row(k);
         here("%s", row.name);
@@ -71,12 +63,12 @@ TEST(each_value_is_kept_at_its_limits_and_refused_beyond)
             TEST_ASSERT_TRUE(parameter_check(part, &values, &bad));
         }
         TEST_ASSERT_EQUAL_UINT16(UINT16_MAX, bad);
-        if (row.minimum > least_of(row.type)) {
+        if (row.minimum > least_of[row.type]) {
             parameter_set(&values, &row, last, row.minimum - 1);
             TEST_ASSERT_FALSE(parameter_check(part, &values, &bad));
             TEST_ASSERT_EQUAL_UINT16(k, bad);
         }
-        if (row.maximum < most_of(row.type)) {
+        if (row.maximum < most_of[row.type]) {
             parameter_set(&values, &row, last, row.maximum + 1);
             TEST_ASSERT_FALSE(parameter_check(part, &values, &bad));
             TEST_ASSERT_EQUAL_UINT16(k, bad);

@@ -51,6 +51,7 @@ static settings_loaded_t load(void)
     return settings_load(&fresh, &storage, &loaded);
 }
 
+/* Any values within their limits. */
 static void fill(uint32_t seed)
 {
     for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
@@ -62,6 +63,12 @@ static void fill(uint32_t seed)
                               settings_set(&settings, k, element, row.minimum + (int32_t)into));
         }
     }
+}
+
+static void save_filled(uint32_t seed)
+{
+    fill(seed);
+    expect_saved();
 }
 
 static bool same(const settings_t *a, const settings_t *b)
@@ -167,8 +174,7 @@ TEST(a_saved_record_is_loaded)
 {
     TEST_ASSERT_EQUAL(RECORD_EMPTY, load().found);
     for (uint32_t seed = 1; seed < 6; seed++) {
-        fill(seed);
-        expect_saved();
+        save_filled(seed);
         const settings_loaded_t result = load();
         TEST_ASSERT_EQUAL(RECORD_LOADED, result.found);
         TEST_ASSERT_EQUAL_UINT8(0, result.missing);
@@ -204,12 +210,10 @@ TEST(ids_keep_their_meaning)
 
 TEST(sequence_numbers_may_wrap)
 {
-    fill(1);
-    expect_saved();
+    save_filled(1);
     store.record.sequence = 0xFFFD;
     for (uint32_t seed = 2; seed < 7; seed++) {
-        fill(seed);
-        expect_saved();
+        save_filled(seed);
         if (seed > 2) { /* the first one is beside a record that is not one less */
             TEST_ASSERT_EQUAL(RECORD_LOADED, load().found);
             TEST_ASSERT_TRUE(same(&settings, &loaded));
@@ -222,10 +226,8 @@ TEST(sequence_numbers_may_wrap)
 TEST(a_cut_at_any_byte_leaves_the_old_or_the_new_record)
 {
     static uint8_t before[MEMORY_BYTES];
-    fill(1);
-    expect_saved();
-    fill(2);
-    expect_saved();
+    save_filled(1);
+    save_filled(2);
     const settings_t old_settings = settings;
     memcpy(before, memory, sizeof before);
     fill(3);
@@ -260,8 +262,7 @@ TEST(a_cut_at_any_byte_leaves_the_old_or_the_new_record)
 
 TEST(every_flipped_bit_is_detected)
 {
-    fill(7);
-    expect_saved();
+    save_filled(7);
     const unsigned bytes = writes - 1u; /* clearing, the record from byte 1 on, completing */
     for (unsigned bit = 0; bit < 8u * bytes; bit++) {
         memory[bit / 8u] = (uint8_t)(memory[bit / 8u] ^ (1u << (bit % 8u)));
@@ -276,11 +277,9 @@ TEST(every_flipped_bit_is_detected)
 
 TEST(a_damaged_newest_record_falls_back_to_the_older_and_says_so)
 {
-    fill(1);
-    expect_saved();
+    save_filled(1);
     const settings_t old_settings = settings;
-    fill(2);
-    expect_saved();
+    save_filled(2);
     memory[SETTINGS_SLOT_BYTES + 20u] ^= 0x10u;
     TEST_ASSERT_EQUAL(RECORD_LOADED_OTHER, load().found);
     TEST_ASSERT_TRUE(same(&loaded, &old_settings));
@@ -368,8 +367,7 @@ TEST(an_entry_that_leaves_the_record_is_not_read)
 
 TEST(a_record_in_another_format_gives_defaults_and_says_so)
 {
-    fill(9);
-    expect_saved();
+    save_filled(9);
     memory[1] = SETTINGS_RECORD_KIND - 1u;
     TEST_ASSERT_EQUAL(RECORD_FOREIGN, load().found);
     expect_defaults();
@@ -377,8 +375,7 @@ TEST(a_record_in_another_format_gives_defaults_and_says_so)
 
 TEST(a_memory_that_does_not_keep_is_reported)
 {
-    fill(4);
-    expect_saved();
+    save_filled(4);
     const settings_t kept = settings;
     fill(5);
     const settings_t wanted = settings;
