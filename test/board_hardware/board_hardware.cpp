@@ -237,12 +237,6 @@ TEST(power_that_fails_in_a_write_leaves_a_byte_that_is_neither)
     TEST_ASSERT_TRUE(board_eeprom(mega.board)[5] != 0xFF);
 }
 
-TEST(eeprom_ready_interrupt_is_a_level)
-{
-    probe mega;
-    expect("03", mega.ask("I"));
-}
-
 /* --- the rest --- */
 
 TEST(analog_input_reads_its_voltage)

@@ -297,11 +297,6 @@ class Run(Case):
         far = self.rows_of_run("b.csv", "--set", "array.pitch_mm=6")
         self.assertGreater(float(near[-1]["p5_c"]), float(far[-1]["p5_c"]) + 0.1)
 
-    def test_an_open_spring_is_found_and_told(self) -> None:
-        self.run_it("a.csv", "--json", self.json, scenario=SCENARIO + "at 5 = fail open 3\n")
-        faults = [spring["fault"] for spring in json.loads(self.json.read_text())["springs"]]
-        self.assertEqual(faults, ["none", "none", "open_spring"] + ["none"] * 6)
-
     def test_what_looks_right_and_is_not(self) -> None:
         events = "at 3 = fail freeze 1\nat 3 = fail lie 2 0.8 1.1\nat 3 = fail swap 4 9\nat 4 = ambient 35\n"
         rows = self.rows_of_run("a.csv", scenario=SCENARIO + events)

@@ -173,16 +173,6 @@ TEST(search_costs_a_declared_array_no_more_than_a_fiftieth)
     }
 }
 
-/* Martensite start is found in the resistance, whatever the loss. */
-TEST(array_that_loses_more_or_less_is_held_in_the_band)
-{
-    for (double loss = 0.85; loss < 1.2; loss += 0.3) {
-        plant_set(plant, "loss_w_per_k", 5.8e-3 * loss);
-        plant_set(plant, "heat_capacity_j_per_k", 0.300 * loss);
-        TEST_ASSERT_TRUE(hold_eight(500.0) < 115.0);
-    }
-}
-
 /* A cloth on the display in mid-hold: what all springs lose falls to a third or to less than a
  * half, and it is lifted again. Each believed alone, they end between 130 and 330 degC. */
 TEST(cloth_that_lies_on_the_display_is_noticed)
@@ -477,15 +467,16 @@ static double hottest_of_everything(uint32_t seed)
     return hottest_c;
 }
 
-/* Of twenty draws, each more than an hour long: most below 120 degC, none far above. */
+/* Of ten draws, each more than an hour long: most below 120 degC, none far above. Thousands,
+ * shorter and with faults: bench_swarm, test/worlds. */
 TEST(everything_at_once_stays_within_the_limits)
 {
     unsigned hot = 0;
-    for (uint32_t seed = 11; seed < 31; seed++) {
+    for (uint32_t seed = 11; seed < 21; seed++) {
         const double hottest_c = hottest_of_everything(seed);
         here("draw %u: %.1f degC", (unsigned)seed, hottest_c);
         TEST_ASSERT_TRUE(hottest_c < 135.0);
         hot += hottest_c > 120.0;
     }
-    TEST_ASSERT_LESS_OR_EQUAL_UINT(8, hot);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(4, hot);
 }

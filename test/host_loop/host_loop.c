@@ -118,21 +118,6 @@ TEST(coarser_plant_steps_change_little)
     loop_destroy(coarse);
 }
 
-TEST(a_repair_ends_its_own_failure_only)
-{
-    start();
-    TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SENSOR_NACK, 0));
-    TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SENSOR_STALE, 3));
-    TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SENSOR_BUS, -1));
-    TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SENSOR_GOOD, 3));
-    loop_advance(loop, 0.1);
-    TEST_ASSERT_EQUAL(CONTROLLER_SENSOR_BUS, loop_inputs(loop)->sensor[3].status);
-    TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_BUS_GOOD, -1));
-    loop_advance(loop, 0.1);
-    TEST_ASSERT_EQUAL(CONTROLLER_SENSOR_OK, loop_inputs(loop)->sensor[3].status);
-    TEST_ASSERT_EQUAL(CONTROLLER_SENSOR_ABSENT, loop_inputs(loop)->sensor[0].status);
-}
-
 /* What looks right and is not: the loop only provokes it; what the controller makes of it is not
  * judged here. */
 TEST(frozen_lying_and_swapped_sensors_show_what_they_should_not)

@@ -95,12 +95,4 @@ static inline void run_log(int k)
                       shown[k], real[k]));
 }
 
-static inline double largest_difference(const double *a, const double *b)
-{
-    double largest = 0.0;
-    for (int k = 0; k < LOG_ROWS * 9; k++)
-        largest = fmax(largest, fabs(a[k] - b[k]));
-    return largest;
-}
-
 #endif

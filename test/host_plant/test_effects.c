@@ -1,59 +1,7 @@
-/* What each effect touches. Their equations are held to a second implementation by
- * against_scipy.py; here is what that does not look at. */
+/* Equations and what each effect touches are held to a second implementation by against_scipy.py;
+ * here is what that does not look at. */
 #include "convection.h"
 #include "plant_rig.h"
-
-/* Which effects touch the temperatures in which drive modes, and which only the picture of them. */
-TEST(each_effect_changes_what_it_should_and_only_that)
-{
-    enum { POWER = 1, CURRENT = 2, DUTY = 4, COMMAND = 8, HEAT = 15, PICTURE = 16 };
-    static const struct {
-        const char *name;
-        unsigned changes;
-    } expected[] = {
-        {"radiation", HEAT},
-        {"natural_convection", HEAT},
-        {"latent_heat", HEAT},
-        {"resistance_phase", CURRENT | DUTY},
-        {"shared_air", HEAT},
-        {"plate_conduction", HEAT},
-        {"fan_wake", HEAT},
-        {"edge_loss", HEAT},
-        {"spring_mismatch", HEAT},
-        {"supply_sag", DUTY | COMMAND},
-        {"ambient_drift", HEAT},
-        {"sensor_lag", PICTURE},
-        {"sensor_gain", PICTURE},
-        {"optical_mixing", PICTURE},
-        {"resistance_temperature", CURRENT | DUTY},
-        {"transformation_shift", 0}, /* alone: nothing depends on the phase */
-        {"contact_resistance", POWER | DUTY},
-        {"fan_curve", HEAT},
-    };
-    static const double largest[4] = {0.8, 2.2, 0.2, 1.0};
-    TEST_ASSERT_EQUAL_UINT(plant_effect_count(), ROWS(expected));
-    set("loss_scale[3]", 1.2);
-    set("command_power_w", 0.8);
-    set("resistance_martensite_rise_per_k", 1e-3);
-    set("transformation_shift_k", 5.0);
-    set("contact_ohm", 0.02);
-    for (int mode = 0; mode < 4; mode++) {
-        make_log((plant_drive_mode_t)mode, largest[mode], 21);
-        run_log(0);
-        TEST_ASSERT_EQUAL_MEMORY(shown[0], real[0], sizeof shown[0]);
-        for (size_t k = 0; k < plant_effect_count(); k++) {
-            const unsigned changes = expected[k].changes;
-            OK(plant_set_effect(plant, expected[k].name, true));
-            run_log(1);
-            const double heat = largest_difference(real[0], real[1]);
-            const double seen = largest_difference(shown[0], shown[1]);
-            const bool hot = changes & (1u << mode), pictured = hot || changes == PICTURE;
-            TEST_ASSERT_TRUE_MESSAGE(hot ? heat > 0.3 : heat == 0.0, expected[k].name);
-            TEST_ASSERT_TRUE_MESSAGE(pictured ? seen > 0.3 : seen == 0.0, expected[k].name);
-            OK(plant_set_effect(plant, expected[k].name, false));
-        }
-    }
-}
 
 /* A sensor at the terminals sees the contact; the spring does not feel it. */
 TEST(a_contact_takes_voltage_and_keeps_its_heat)

@@ -324,22 +324,7 @@ TEST(two_layers_are_one_plant_of_twice_as_many_springs)
     TEST_ASSERT_NULL(plant_create_layers(32, 32, 2));
 }
 
-/* Figures of docs/physics.md. */
-TEST(balance_of_design_section_1)
-{
-    /* 1.5 A in austenite, 0.219 ohm, against 5.8 mW/K: 105 degC, time constant 52 s */
-    set("resistance_ohm", 0.219);
-    for (int i = 0; i < 9; i++)
-        drive(i, PLANT_DRIVE_CURRENT, 1.5);
-    settle();
-    TEST_ASSERT_DOUBLE_WITHIN(0.1, 105.0, at(4));
-    /* the fan's 11.3 mW/K at the same current: far from 105 */
-    OK(plant_set_fan(plant, 1.0));
-    settle();
-    TEST_ASSERT_DOUBLE_WITHIN(0.1, 20.0 + 2.25 * 0.219 / 0.0113, at(4));
-    TEST_ASSERT_TRUE(at(4) < 64.0);
-}
-
+/* A figure of docs/physics.md. */
 TEST(constant_current_from_cold_never_transforms_at_1_5_a_but_runs_past_at_a_little_more)
 {
     on("latent_heat");

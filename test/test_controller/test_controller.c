@@ -60,15 +60,6 @@ static void respond(void)
     }
 }
 
-static int32_t sum_ma(void)
-{
-    int32_t sum = 0;
-    for (int k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
-        sum += spring_mohm[k] < 0 ? 0 : (int32_t)outputs.duty[k] * 6250 / (spring_mohm[k] + 180);
-    }
-    return sum;
-}
-
 static void run(uint32_t ticks)
 {
     for (uint32_t n = 0; n < ticks; n++) {
@@ -121,73 +112,6 @@ TEST(what_is_no_circuit_teaches_nothing_of_the_supply)
         TEST_ASSERT_EQUAL(wrong != 0 ? SAFETY_FAULT_SENSOR_MISMATCH : SAFETY_FAULT_NONE,
                           controller_fault(&controller, 4));
     }
-}
-
-/* 9 x 3 A are asked for, 15 A are there, 14.7 A are given: in every tick, whatever the springs'
- * resistance. */
-TEST(sum_of_currents_never_exceeds_the_supply)
-{
-    settings.policy.open_current_ma = 3000;
-    for (int32_t mohm = 120; mohm <= 300; mohm += 45) {
-        start();
-        for (int k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
-            spring_mohm[k] = mohm;
-        }
-        for (int32_t n = 0; n < 900; n++) {
-            if (n % 150 == 0) {
-                all_on();
-            } else if (n % 150 == 100) {
-                controller_stop(&controller);
-                TEST_ASSERT_TRUE(controller_set_target(&controller, (uint8_t)(n / 150), 1000));
-            }
-            run(1);
-            TEST_ASSERT_LESS_OR_EQUAL_INT32(15000, sum_ma());
-        }
-        all_on();
-        run(150);
-        TEST_ASSERT_GREATER_THAN_INT32(14400, sum_ma());
-        for (uint8_t k = 0; k < 9; k++) {
-            TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, k));
-            TEST_ASSERT_INT_WITHIN(1, controller_target_ma(&controller, 0),
-                                   controller_target_ma(&controller, k));
-            TEST_ASSERT_BITS(DRIVE_POLICY_LIMIT_SUPPLY, DRIVE_POLICY_LIMIT_SUPPLY,
-                             controller_limits(&controller, k));
-        }
-        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
-    }
-}
-
-TEST(model_is_fed_with_the_measured_power_of_each_tick)
-{
-    thermal_model_t model;
-    TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &settings.model, NULL));
-    thermal_model_reset(&model, AMBIENT_C7);
-    controller_set_temperature(&controller, AMBIENT_C7); /* else it could be warm */
-    uint32_t power_uw[THERMAL_MODEL_MAX_SPRINGS] = {0};
-    for (int n = 0; n < 2000;
-         n++) { /* currents that no loop asked for: below what counts as stuck on */
-        for (int k = 0; k < 9; k++) {
-            inputs.sensor[k].current_ma = (int16_t)(n * 7 % 100 - 5);
-            inputs.sensor[k].voltage_mv = (int16_t)(k * 977 - 200);
-            if (inputs.sensor[k].current_ma > 0 && inputs.sensor[k].voltage_mv > 0) {
-                power_uw[k] +=
-                    (uint32_t)(inputs.sensor[k].current_ma * inputs.sensor[k].voltage_mv);
-            }
-        }
-        controller_tick(&controller, &inputs, &outputs);
-        if (n % 5 == 4) {
-            for (int k = 0; k < 9; k++) {
-                power_uw[k] /= 5;
-            }
-            thermal_model_step(&model, power_uw);
-            memset(power_uw, 0, sizeof power_uw);
-            for (uint8_t k = 0; k < 9; k++) {
-                TEST_ASSERT_INT16_WITHIN(1, thermal_model_temperature_c7(&model, k),
-                                         controller_temperature_c7(&controller, k));
-            }
-        }
-    }
-    TEST_ASSERT_GREATER_THAN_INT16(AMBIENT_C7 + 128, controller_temperature_c7(&controller, 8));
 }
 
 /* From martensite to austenite, whichever has more. */
@@ -427,28 +351,6 @@ TEST(no_air_that_may_be_told_takes_heat_that_was_given)
     controller_set_temperature(&controller, AMBIENT_C7);
     TEST_ASSERT_TRUE(controller_is_warm(&controller, 4));
     TEST_ASSERT_TRUE(controller_temperature_c7(&controller, 4) > 55 * 128);
-}
-
-/* Open loop heats springs of which nobody knows anything, so their model is no more than a guess:
- * what they were given is known all the same. */
-TEST(heat_that_was_given_is_kept_over_a_warm_reset)
-{
-    settings.policy.policy = DRIVE_POLICY_OPEN;
-    start();
-    controller_set_target(&controller, 4, 1000);
-    run(50u * 40u);
-    TEST_ASSERT_FALSE(controller_is_known(&controller));
-    const float given_c = controller_delivered_c(&controller, 4);
-    temperature_ceiling_t delivered;
-    controller_get_delivered(&controller, &delivered);
-    start();
-    TEST_ASSERT_FALSE(controller_is_warm(&controller, 4));
-    controller_set_delivered(&controller, &delivered);
-    TEST_ASSERT_TRUE(controller_is_warm(&controller, 4));
-    TEST_ASSERT_EQUAL_FLOAT(given_c, controller_delivered_c(&controller, 4));
-    TEST_ASSERT_UINT16_WITHIN(1, 0, controller_rest_s(&controller, 4));
-    run(50u * 10u);
-    TEST_ASSERT_UINT16_WITHIN(1, 10, controller_rest_s(&controller, 4));
 }
 
 /* 2.35 A take it beyond 120 degC by what was declared as it became warm, and the belief is talked
@@ -938,31 +840,6 @@ TEST(what_settings_decide_and_a_bit_turned_over_drives_nothing)
         TEST_ASSERT_FALSE(outputs.supply);
     }
     start();
-    TEST_ASSERT_TRUE(controller_is_sound(&controller));
-}
-
-TEST(what_writes_settings_is_no_bit_that_turned_over)
-{
-    controller_set_pattern(&controller, (bool[CONTROLLER_MAX_SPRINGS]){true, true});
-    run(100);
-    TEST_ASSERT_TRUE(controller_set_policy(&controller, DRIVE_POLICY_PRECOMPENSATE));
-    TEST_ASSERT_TRUE(controller_set_fan(&controller, 60));
-    inputs.fan_percent = 60;
-    run(PASSES_TICKS);
-    settings.model.loss_uw_per_k = 6000;
-    settings.safety.maximum_on_s = 7;
-    TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
-    run(PASSES_TICKS);
-    temperature_ceiling_t delivered;
-    controller_get_delivered(&controller, &delivered);
-    controller_set_delivered(&controller, &delivered);
-    controller_set_temperature(&controller, 30 * 128);
-    controller_clear_faults(&controller);
-    inputs.ambient_c7 = 25 * 128;
-    run(PASSES_TICKS);
-    settings.model.rows = 2;
-    TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
-    run(PASSES_TICKS);
     TEST_ASSERT_TRUE(controller_is_sound(&controller));
 }
 

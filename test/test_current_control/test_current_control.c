@@ -251,47 +251,6 @@ TEST(blind_channel_holds_then_goes_off_then_returns)
     TEST_ASSERT_LESS_OR_EQUAL_UINT16(128, current_control_reference_ma(&control, 0));
 }
 
-TEST(any_input_at_any_moment_stays_within_the_duty_range)
-{
-    const int16_t current_ma[] = {INT16_MIN, -1, 0, 1, 3200, INT16_MAX};
-    const uint16_t word[] = {0, 1, 500, 3200, 32767, 32768, UINT16_MAX};
-    const uint16_t supply_mv[] = {1000, 5000, 16000};
-    for (size_t s = 0; s < 3; s++) {
-        for (uint16_t drop_mv = 0; drop_mv <= 1000; drop_mv += 1000) {
-            parameters.supply_mv = supply_mv[s];
-            parameters.freewheel_mv = drop_mv;
-            parameters.trim_limit_mohm = 1000;
-            parameters.slew_ma_per_tick = 3200;
-            parameters.maximum_current_ma = 3200;
-            parameters.integral_permille = 1000;
-            TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
-            uint32_t random = 1;
-            for (int n = 0; n < 20000; n++) {
-                uint16_t target_ma[9], duty[9];
-                int16_t measured_ma[9];
-                bool valid[9];
-                for (uint8_t k = 0; k < 9; k++) {
-                    random = random * 1664525u + 1013904223u;
-                    target_ma[k] = word[(random >> 8) % 7];
-                    measured_ma[k] = current_ma[(random >> 12) % 6];
-                    valid[k] = (random >> 20) % 8 != 0;
-                    current_control_set_resistance(&control, k, word[(random >> 16) % 7]);
-                }
-                current_control_tick(&control, 9, target_ma, measured_ma, valid,
-                                     (random >> 24) % 4 != 0, duty);
-                for (uint8_t k = 0; k < 9; k++) {
-                    TEST_ASSERT_LESS_OR_EQUAL_UINT16(parameters.maximum_duty_steps, duty[k]);
-                    TEST_ASSERT_LESS_OR_EQUAL_UINT16(3200,
-                                                     current_control_reference_ma(&control, k));
-                    TEST_ASSERT_TRUE(target_ma[k] != 0 || duty[k] == 0);
-                    TEST_ASSERT_INT32_WITHIN(control.trim_limit_q24, 0,
-                                             control.channel[k].trim_q24);
-                }
-            }
-        }
-    }
-}
-
 /* The last of four channels gives the same whatever the others are told. */
 TEST(channels_do_not_touch_each_other)
 {

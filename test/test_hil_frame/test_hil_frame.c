@@ -78,17 +78,6 @@ TEST(frame_is_as_described)
     TEST_ASSERT_EQUAL('\n', line[16]);
 }
 
-TEST(no_frame_holds_a_realtime_byte)
-{
-    for (uint16_t tick = 0; tick < 2000; tick++) {
-        sent.tick = tick;
-        sent.sensor[0].current_ma = (int16_t)(tick * 31);
-        length = hil_frame_encode_sensors(&sent, line);
-        TEST_ASSERT_NULL(memchr(line, '!', length));
-        TEST_ASSERT_NULL(memchr(line, '?', length));
-    }
-}
-
 TEST(every_flipped_bit_is_detected)
 {
     for (uint16_t bit = 0; bit < 8u * length; bit++) {

@@ -84,6 +84,7 @@ TEST(a_value_beyond_what_is_read_is_refused)
     TEST_ASSERT_FALSE(parameter_check(PARAMETER_PART_MODEL, &values, NULL));
 }
 
+/* And no name is the beginning of another one's with a number, `name_3`: that is a spring. */
 TEST(names_and_ids_are_used_once)
 {
     for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
@@ -91,22 +92,13 @@ TEST(names_and_ids_are_used_once)
         here("%s", row.name);
         TEST_ASSERT_NOT_EQUAL(0, row.id);
         TEST_ASSERT_TRUE(strlen(row.name) < PARAMETER_NAME_SIZE - 1u);
+        const char *const last = strrchr(row.name, '_');
+        TEST_ASSERT_TRUE(last == NULL || last[1] < '0' || last[1] > '9');
         for (uint16_t other = 0; other < k; other++) {
             const parameter_row_t earlier = parameter_row(other);
             TEST_ASSERT_NOT_EQUAL(earlier.id, row.id);
             TEST_ASSERT_TRUE(strcmp(earlier.name, row.name) != 0);
         }
-    }
-}
-
-/* A name of a setting is not the beginning of another one's with a number: `name_3`. */
-TEST(a_number_after_a_name_is_always_a_spring)
-{
-    for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
-        const char *const name = parameter_row(k).name;
-        here("%s", name);
-        const char *const last = strrchr(name, '_');
-        TEST_ASSERT_TRUE(last == NULL || last[1] < '0' || last[1] > '9');
     }
 }
 

@@ -1,6 +1,5 @@
 /* A change that nobody sealed is found within two passes, whatever bit it is and wherever; one that
  * was sealed is none. */
-#include <stddef.h>
 #include <string.h>
 
 #include "../run_tests.h"
@@ -87,20 +86,4 @@ TEST(a_sealed_change_is_right_and_what_was_found_stays_found)
     TEST_ASSERT_FALSE(scrub_is_sound(&scrub));
     scrub_start(&scrub, stretches, &owner);
     TEST_ASSERT_TRUE(scrub_is_sound(&scrub));
-}
-
-/* Its own bytes are RAM, too: at worst it finds what is not there. */
-TEST(any_bit_of_its_own_that_turns_over_ends_no_program)
-{
-    for (size_t at = 0; at < sizeof scrub; at++) {
-        for (uint8_t bit = 0; bit < 8; bit++) {
-            setUp();
-            if (at == offsetof(scrub_t, broken)) {
-                continue;
-            }
-            (void)scrub_step(&scrub, stretches, &owner, 16);
-            ((uint8_t *)&scrub)[at] ^= (uint8_t)(1u << bit);
-            (void)steps_of_a_pass(16);
-        }
-    }
 }

@@ -174,30 +174,6 @@ TEST(no_accepted_corner_wraps)
     TEST_ASSERT_TRUE(accepted > 5000u);
 }
 
-TEST(random_corners_for_long_stay_consistent)
-{
-    for (unsigned round = 0; round < 2000; round++) {
-        corner(random_bits());
-        if (thermal_model_init(&model, &parameters, 0) != THERMAL_MODEL_OK) {
-            continue;
-        }
-        for (int k = 0; k < 300; k++) {
-            if (k % 10 == 0) {
-                for (int i = 0; i < 9; i++) {
-                    power_uw[i] = random_bits() >> (random_bits() % 32u);
-                }
-                uint8_t spring = (uint8_t)random_bits();
-                thermal_model_set_temperature(&model, spring, (int16_t)random_bits());
-                thermal_model_set_fan(&model, (uint8_t)random_bits());
-                thermal_model_set_ambient(&model, (int16_t)random_bits());
-                (void)thermal_model_power_to_hold_uw(&model, spring, (int16_t)random_bits());
-            }
-            run(1);
-            TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
-        }
-    }
-}
-
 TEST(too_much_power_counts_as_the_highest)
 {
     static const uint32_t much[] = {THERMAL_MODEL_HIGHEST_POWER_UW + 1u, 0x01000000u, 0x04000001u,

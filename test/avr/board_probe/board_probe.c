@@ -1,7 +1,6 @@
 /* Exercises one peripheral of the simulated Mega per letter received, and says what it saw: see
  * test/board_hardware. Registers are driven directly, so that the test is of the board and not of a
  * library. */
-#include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/wdt.h>
 #include <stdint.h>
@@ -110,14 +109,6 @@ static uint8_t read_eeprom(uint16_t address)
     return EEDR;
 }
 
-static volatile uint8_t eeprom_interrupts;
-ISR(EE_READY_vect)
-{
-    if (++eeprom_interrupts == 3) {
-        EECR &= (uint8_t)~_BV(EERIE);
-    }
-}
-
 static void obey(uint8_t letter)
 {
     switch (letter) {
@@ -173,14 +164,6 @@ static void obey(uint8_t letter)
         break;
     case 'R':
         put_hex(read_eeprom(get()));
-        break;
-    case 'I': /* the ready interrupt comes again as long as it is enabled */
-        eeprom_interrupts = 0;
-        EECR |= _BV(EERIE);
-        sei();
-        _delay_us(100);
-        cli();
-        put_hex(eeprom_interrupts);
         break;
     case 'a': /* voltage at A0 */
         ADMUX = _BV(REFS0);
