@@ -186,6 +186,7 @@ def refuses_what_is_wrong(program: str, elf: Path) -> None:
         ["--elf", "/no/such.elf"],
         ["--elf", str(elf), "--speed", "fast"],
         ["--elf", __file__],
+        ["--elf", sys.executable],  # of another processor
         ["--elf", str(elf), "--thermometers", "pty", "--thermometer-springs", "3,1"],
         ["--elf", str(elf), "--thermometers", "pty", "--thermometer-springs", "10"],
         ["--elf", str(elf), "--thermometer-rate", "2"],

@@ -1,10 +1,6 @@
 /* The readers and writers of docs/files.md: what they take, what they refuse, and where they say it
  * is. */
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <functional>
 #include <string>
 
@@ -82,30 +78,6 @@ TEST(log_is_written_with_fixed_decimals)
     writer.row({0.02, 1.0, std::nan("")});
     TEST_ASSERT_EQUAL_STRING("# scenario: x y\ntime_s,u1,t1_c\n0.00,0.500,0.000\n0.02,1.000,\n",
                              writer.text().c_str());
-}
-
-TEST(file_is_written_whole_or_not_at_all)
-{
-    namespace fs = std::filesystem;
-    const fs::path folder =
-        fs::temp_directory_path() / ("ninespring_files_" + std::to_string(std::rand()));
-    fs::create_directory(folder);
-    const std::string path = (folder / "a.txt").string();
-    write_file_whole(path, "one");
-    write_file_whole(path, "two");
-    std::ifstream stream(path);
-    std::string text;
-    stream >> text;
-    TEST_ASSERT_EQUAL_STRING("two", text.c_str());
-    bool failed = false;
-    try {
-        write_file_whole((folder / "none" / "a.txt").string(), "x");
-    } catch (const work_error &) {
-        failed = true;
-    }
-    TEST_ASSERT_TRUE(failed);
-    TEST_ASSERT_EQUAL(1, std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
-    fs::remove_all(folder);
 }
 
 const std::string SCENARIO = "[scenario]\nduration_s = 60\n";

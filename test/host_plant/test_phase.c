@@ -93,15 +93,3 @@ TEST(a_load_on_a_held_spring_leaves_its_heat_with_whatever_holds_it)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, -0.5 * get("latent_heat_j"),
                               plant_energy_input_j(plant) - before_j);
 }
-
-/* Another parameter that is set in mid-run is no load: the minor loop goes on as it was. */
-TEST(what_is_no_load_leaves_the_memory_alone)
-{
-    on("contact_resistance");
-    lead(93.0);
-    lead(73.0);
-    lead(80.0);
-    set("contact_ohm[1]", 0.05);
-    lead(70.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0477457514, plant_austenite(plant, 0));
-}

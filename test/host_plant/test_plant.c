@@ -41,22 +41,6 @@ TEST(everything_is_off_by_default)
     }
 }
 
-/* Parameters of an effect that is off, moved anywhere, change nothing to the last bit. */
-TEST(parameters_of_an_effect_that_is_off_do_nothing)
-{
-    make_log(PLANT_DRIVE_DUTY, 0.2, 8);
-    run_log(0);
-    for (size_t k = 0; k < plant_parameter_count(); k++) {
-        const plant_parameter_t *parameter = plant_parameter(k);
-        if (!parameter->effect)
-            continue;
-        set(parameter->name, parameter->maximum);
-        run_log(1);
-        TEST_ASSERT_EQUAL_MEMORY_MESSAGE(shown[0], shown[1], sizeof shown[0], parameter->name);
-        set(parameter->name, parameter->default_value);
-    }
-}
-
 TEST(faults_stop_the_heat)
 {
     for (int i = 0; i < 3; i++)

@@ -160,7 +160,7 @@ TEST(supply_that_comes_back_is_met_before_it_is_a_fault)
     }
 }
 
-TEST(reference_rises_by_the_slew_and_falls_at_once)
+TEST(reference_rises_by_the_slew_to_the_maximum_and_falls_at_once)
 {
     parameters.slew_ma_per_tick = 100;
     TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
@@ -178,6 +178,9 @@ TEST(reference_rises_by_the_slew_and_falls_at_once)
     TEST_ASSERT_INT32_WITHIN(40000, 700000, load.now_ua);
     TEST_ASSERT_EQUAL_UINT16(0, tick(0));
     TEST_ASSERT_EQUAL_UINT16(0, current_control_reference_ma(&control, 0));
+    (void)mean_ua(UINT16_MAX, 100);
+    TEST_ASSERT_EQUAL_UINT16(parameters.maximum_current_ma,
+                             current_control_reference_ma(&control, 0));
 }
 
 TEST(channels_have_their_turns_in_alternate_ticks)

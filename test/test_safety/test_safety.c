@@ -170,27 +170,6 @@ TEST(sum_above_the_supply_trips_everything)
     TEST_ASSERT_TRUE(safety_allows(&safety, 0));
 }
 
-/* Switched off before anything was noticed; and it freezes no less for being cleared. */
-TEST(sensor_that_goes_on_showing_what_flowed_is_frozen)
-{
-    safety_sample_t sample = running;
-    ticks(4, &sample, 10);
-    sample.expected_ma = 0;
-    ticks(4, &sample, 1); /* of the moment before, in part */
-    sample.off = true;
-    for (uint8_t cleared = 0; cleared < 2; cleared++) {
-        ticks(4, &sample, parameters.bad_samples - 1u);
-        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 4));
-        ticks(4, &sample, 100);
-        TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, safety_fault(&safety, 4));
-        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
-        safety_clear(&safety);
-    }
-    sample.current_ma--;
-    ticks(4, &sample, parameters.bad_samples);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
-}
-
 /* Whatever was found before it, of the spring and of the board, and while that goes on. */
 TEST(current_without_duty_overrides_every_other_fault)
 {

@@ -81,18 +81,6 @@ TEST(the_longest_line_fits_what_is_asked_for)
     TEST_ASSERT_EQUAL_UINT16(0, telemetry.dropped);
 }
 
-TEST(a_line_without_room_is_dropped_whole_and_counted)
-{
-    TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 50));
-    room = (uint16_t)(TELEMETRY_LINE_BYTES(9) - 1u);
-    tick_at(0, 0);
-    TEST_ASSERT_EQUAL_UINT(0, said_length);
-    TEST_ASSERT_EQUAL_UINT16(1, telemetry.dropped);
-    telemetry.dropped = 65535;
-    tick_at(20, 0);
-    TEST_ASSERT_EQUAL_UINT16(65535, telemetry.dropped);
-}
-
 TEST(what_of_a_round_found_no_room_is_dropped_and_every_spring_has_its_turn)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 50));

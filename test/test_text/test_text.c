@@ -27,25 +27,6 @@ TEST(formats_fixed_decimals)
     }
 }
 
-TEST(what_is_formatted_parses_back)
-{
-    uint32_t seed = 1;
-    for (unsigned i = 0; i < 100000; i++) {
-        char text[TEXT_DECIMAL_SIZE];
-        int32_t back = 0;
-        seed = seed * 1664525u + 1013904223u;
-        int32_t value = (int32_t)(seed >> (seed % 31u));
-        value = (i & 1u) != 0 ? -(value / 2) : value;
-        if (value == INT32_MIN) {
-            continue;
-        }
-        const uint8_t decimals = (uint8_t)(i % 7u);
-        text_format_decimal(value, decimals, text);
-        TEST_ASSERT_EQUAL_MESSAGE(TEXT_OK, text_parse_decimal(text, decimals, &back), text);
-        TEST_ASSERT_EQUAL_INT32(value, back);
-    }
-}
-
 TEST(refuses_what_is_no_number)
 {
     static const char *const bad[] = {"",   "-",  "+",   ".",      "1.2.3", "1e3", "0x1",   "nan",

@@ -2,20 +2,8 @@
  * test/board_hardware. Registers are driven directly, so that the test is of the board and not of a
  * library. */
 #include <avr/io.h>
-#include <avr/wdt.h>
 #include <stdint.h>
 #include <util/delay.h>
-
-static uint8_t starts __attribute__((section(".noinit")));
-static uint8_t reset_flags __attribute__((section(".noinit")));
-
-static void early(void) __attribute__((naked, used, section(".init3")));
-static void early(void)
-{
-    reset_flags = MCUSR;
-    MCUSR = 0;
-    wdt_disable();
-}
 
 static void put(uint8_t octet)
 {
@@ -112,15 +100,6 @@ static uint8_t read_eeprom(uint16_t address)
 static void obey(uint8_t letter)
 {
     switch (letter) {
-    case 'm': /* reset flags and starts since power-on */
-        put_hex(reset_flags);
-        put_hex(starts);
-        break;
-    case 'w': /* hang under the watchdog */
-        wdt_enable(WDTO_250MS);
-        GPIOR0 = 4;
-        for (;;) {
-        }
     case 'i': /* address, register */ {
         const uint8_t address = get();
         read_sensor(address, get());
@@ -165,17 +144,6 @@ static void obey(uint8_t letter)
     case 'R':
         put_hex(read_eeprom(get()));
         break;
-    case 'a': /* voltage at A0 */
-        ADMUX = _BV(REFS0);
-        ADCSRA = (uint8_t)(_BV(ADEN) | _BV(ADSC) | 7u);
-        while ((ADCSRA & _BV(ADSC)) != 0) {
-        }
-        {
-            const uint16_t result = ADC;
-            put_hex((uint8_t)(result >> 8));
-            put_hex((uint8_t)result);
-        }
-        break;
     case 'd': /* pins of the bus: bit 0 SCL, bit 1 SDA */
         put_hex(PIND & 3u);
         break;
@@ -188,10 +156,6 @@ static void obey(uint8_t letter)
 
 int main(void)
 {
-    if ((reset_flags & _BV(PORF)) != 0) {
-        starts = 0;
-    }
-    starts++;
     UBRR0 = 16;
     UCSR0A = _BV(U2X0);
     UCSR0B = _BV(RXEN0) | _BV(TXEN0);
