@@ -24,45 +24,6 @@ TEST(no_heat_from_nothing)
     TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
 }
 
-/* Where a spring of 3 x 3 is after so many quarter turns. */
-static int turned(int spring, int turns)
-{
-    return turns == 0 ? spring : turned(spring % 3 * 3 + 2 - spring / 3, turns - 1);
-}
-
-TEST(rotating_the_pattern_rotates_the_temperatures)
-{
-    parameters.air_exchange_uw_per_k = 60000;
-    parameters.plate_coupling_uw_per_k = 500;
-    parameters.radiating_area_cmm2 = 11080;
-    parameters.loss_rise_ppm_per_k = 2000;
-    thermal_model_state_t state[4];
-    for (int turn = 0; turn < 4; turn++) {
-        parameters.wake_uw_per_k = 1000;
-        parameters.wake_direction = (uint8_t)turn; /* clockwise, as the pattern */
-        start();
-        thermal_model_set_fan(&model, 40);
-        random_state = 5;
-        for (int k = 0; k < 3000; k++) {
-            if (k % 100 == 0) {
-                for (int i = 0; i < 9; i++) {
-                    power_uw[turned(i, turn)] = random_bits() % 1000000u;
-                }
-            }
-            run(1);
-        }
-        thermal_model_get_state(&model, &state[turn]);
-    }
-    for (int turn = 1; turn < 4; turn++) {
-        for (int i = 0; i < 9; i++) {
-            TEST_ASSERT_EQUAL_MEMORY(&state[0].spring[i], &state[turn].spring[turned(i, turn)],
-                                     sizeof state[0].spring[0]);
-        }
-        TEST_ASSERT_EQUAL_INT32(state[0].air_c23, state[turn].air_c23);
-        TEST_ASSERT_EQUAL_INT32(state[0].plate_c23, state[turn].plate_c23);
-    }
-}
-
 /* ---- an effect at zero is no effect ------------------------------------------------------------
  */
 

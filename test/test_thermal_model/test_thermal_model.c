@@ -5,75 +5,17 @@
 /* ---- figures by hand ---------------------------------------------------------------------------
  */
 
-/* A row of springs, and what each power makes of it: where it settles, and after one time constant,
- * 0.3 J/K / 5.8 mW/K = 51.7 s. Random arrays against another integration:
- * test/host_fixed_vs_double. */
-TEST(row_of_springs_comes_to_what_is_computed_by_hand)
+/* 5.8 mW/K x 50 K x 1.2, and 1.108e-4 m2 sigma (343.15^4 - 293.15^4) = 40.71 mW. All else that a
+ * network has against another integration: test/host_fixed_vs_double. */
+TEST(a_loss_that_rises_and_what_is_radiated_come_to_what_is_computed_by_hand)
 {
-    enum {
-        HALF = PARAMETER_fan_half_share,
-        RISE = PARAMETER_loss_rise_per_k,
-        AREA = PARAMETER_radiating_area_mm2,
-        AIR = PARAMETER_air_exchange_w_per_k,
-        AIR_J = PARAMETER_air_heat_capacity_j_per_k,
-        PLATE = PARAMETER_plate_coupling_w_per_k,
-        PLATE_W = PARAMETER_plate_loss_w_per_k,
-        PLATE_J = PARAMETER_plate_heat_capacity_j_per_k,
-        WAKE = PARAMETER_wake_w_per_k,
-        TO = PARAMETER_wake_direction,
-        BESIDE = PARAMETER_orthogonal_fan_w_per_k
-    };
-    static const struct {
-        uint8_t columns, fan_percent;
-        uint32_t steps, uw[2];
-        struct {
-            uint16_t name;
-            int32_t value;
-        } set[3];                    /* up to the first 0, which is the rows */
-        double c[3], air_c, plate_c; /* 0: not looked at */
-    } table[] = {
-        {1, 0, 10000, {290000}, {{0, 0}}, {70}, 0, 0},
-        {1, 0, 517, {290000}, {{0, 0}}, {20 + 31.61}, 0, 0}, /* 1 - 1 / e of 50 K */
-        {1, 100, 10000, {226000}, {{0, 0}}, {40}, 0, 0},
-        {1, 50, 10000, {226000}, {{0, 0}}, {20 + 0.226 / 0.00855}, 0, 0},
-        {1, 50, 10000, {226000}, {{HALF, 735}}, {20 + 0.226 / (0.0058 + 0.735 * 0.0055)}, 0, 0},
-        /* half of 0.3 W / 5.8 mW/K and of 0.3 W / (5.8 + 2 x 0.586) mW/K: their sum, difference */
-        {2, 0, 20000, {300000}, {{0, 0}}, {20 + 47.377, 20 + 4.347}, 0, 0},
-        /* 5.8 mW/K x 50 K x 1.2; 1.108e-4 m2 sigma (343.15^4 - 293.15^4) = 40.71 mW */
-        {1, 0, 10000, {388710}, {{RISE, 4000}, {AREA, 11080}}, {70}, 0, 0},
-        /* two equal resistances in a row */
-        {1, 0, 20000, {145000}, {{AIR, 5800}, {AIR_J, 100}}, {70}, 45, 0},
-        {1, 0, 60000, {340000}, {{PLATE, 2000}, {PLATE_W, 2000}, {PLATE_J, 1000}}, {70}, 0, 45},
-        {3, 100, 10000, {0, 565000}, {{WAKE, 1130}, {BESIDE, 0}}, {20, 70, 25}, 0, 0}, /* a tenth */
-        {3, 100, 10000, {0, 565000}, {{WAKE, 1130}, {BESIDE, 0}, {TO, 2}}, {25, 70, 20}, 0, 0},
-        /* what the wake brings was taken from the air: 0.5 W / 20 mW/K */
-        {3, 100, 20000, {500000}, {{AIR, 20000}, {WAKE, 5000}}, {0}, 45, 0},
-    };
-    for (size_t n = 0; n < ROWS(table); n++) {
-        setUp();
-        parameters.rows = 1;
-        parameters.columns = table[n].columns;
-        for (unsigned k = 0; k < 3 && table[n].set[k].name != 0; k++) {
-            const parameter_row_t row = parameter_row(table[n].set[k].name);
-            parameter_set(&parameters, &row, 0, table[n].set[k].value);
-        }
-        start();
-        thermal_model_set_fan(&model, table[n].fan_percent);
-        power_uw[0] = table[n].uw[0];
-        power_uw[1] = table[n].uw[1];
-        run(table[n].steps);
-        here("row %u", (unsigned)n);
-        for (uint8_t k = 0; k < 3 && table[n].c[k] > 0.0; k++) {
-            TEST_ASSERT_DOUBLE_WITHIN(0.03, table[n].c[k], degrees(k));
-        }
-        if (table[n].air_c > 0.0) {
-            TEST_ASSERT_DOUBLE_WITHIN(0.03, table[n].air_c, thermal_model_air_c7(&model) / 128.0);
-        }
-        if (table[n].plate_c > 0.0) {
-            TEST_ASSERT_DOUBLE_WITHIN(0.1, table[n].plate_c,
-                                      thermal_model_plate_c7(&model) / 128.0);
-        }
-    }
+    parameters.rows = parameters.columns = 1;
+    parameters.loss_rise_ppm_per_k = 4000;
+    parameters.radiating_area_cmm2 = 11080;
+    start();
+    power_uw[0] = 388710;
+    run(10000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 70.0, degrees(0));
 }
 
 TEST(air_without_capacity_follows_at_once)
