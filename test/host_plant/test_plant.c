@@ -1,6 +1,98 @@
-/* What users of plant.h call: what it accepts and refuses, and that it is exact. */
+/* What users of plant.h call: what it accepts and refuses, and that it is exact. Its equations, and
+ * what each effect touches, are held to a second implementation by against_scipy.py; here is what
+ * that does not look at: overlapping bands, loads that are logged, contacts, correlations. */
+#include <math.h>
+#include <string.h>
+
+#include "../run_tests.h"
+#include "convection.h"
 #include "electrics.h"
-#include "plant_rig.h"
+#include "plant.h"
+
+static plant_t *plant;
+
+void setUp(void)
+{
+    plant = plant_create(3, 3);
+}
+void tearDown(void)
+{
+    plant_destroy(plant);
+}
+
+#define OK(call) TEST_ASSERT_EQUAL_INT(PLANT_OK, (call))
+
+static void set(const char *name, double value)
+{
+    OK(plant_set(plant, name, value));
+}
+static double get(const char *name)
+{
+    double value;
+    OK(plant_get(plant, name, &value));
+    return value;
+}
+static void on(const char *effect)
+{
+    OK(plant_set_effect(plant, effect, true));
+}
+static double at(int spring)
+{
+    return plant_temperature_c(plant, spring);
+}
+static void drive(int spring, plant_drive_mode_t mode, double quantity)
+{
+    OK(plant_drive(plant, spring, mode, quantity));
+}
+static void hold(int spring, double t)
+{
+    drive(spring, PLANT_DRIVE_TEMPERATURE, t);
+}
+static void settle(void)
+{
+    OK(plant_settle(plant, 1e6));
+}
+static void uncouple(void)
+{
+    set("orthogonal_w_per_k", 0);
+    set("orthogonal_fan_w_per_k", 0);
+    set("diagonal_w_per_k", 0);
+    set("diagonal_fan_w_per_k", 0);
+}
+
+static unsigned random_state;
+static double uniform(void) /* the same numbers everywhere */
+{
+    random_state = random_state * 1664525u + 1013904223u;
+    return (double)(random_state >> 8) / 16777216.0;
+}
+
+#define LOG_ROWS 600
+static double log_time[LOG_ROWS], log_drive[LOG_ROWS * 9], log_fan[LOG_ROWS], log_ambient[LOG_ROWS];
+static double shown[2][LOG_ROWS * 9], real[2][LOG_ROWS * 9];
+static plant_drive_mode_t log_mode[9];
+
+static void make_log(plant_drive_mode_t mode, double largest, unsigned seed)
+{
+    random_state = seed;
+    for (int r = 0; r < LOG_ROWS; r++) {
+        log_time[r] = r;
+        log_fan[r] = r < 300 ? 0.0 : 0.7;
+        log_ambient[r] = 20.0;
+        for (int i = 0; i < 9; i++)
+            log_drive[r * 9 + i] =
+                r % 40 ? log_drive[(r - 1) * 9 + i] : (uniform() < 0.4 ? 0.0 : largest * uniform());
+    }
+    for (int i = 0; i < 9; i++)
+        log_mode[i] = mode;
+}
+
+static void run_log(int k)
+{
+    plant_reset(plant);
+    OK(plant_simulate(plant, LOG_ROWS, log_time, log_mode, log_drive, log_fan, log_ambient,
+                      shown[k], real[k]));
+}
 
 TEST(tolerance_governs_the_error)
 {
@@ -330,4 +422,134 @@ TEST(constant_current_from_cold_never_transforms_at_1_5_a_but_runs_past_at_a_lit
     settle();
     TEST_ASSERT_EQUAL_DOUBLE(1.0, plant_austenite(plant, 0));
     TEST_ASSERT_TRUE(at(0) > 108.0);
+}
+
+/* ---- the transformation, and a load on it ---- */
+
+#define PI 3.141592653589793
+
+static void lead(double t)
+{
+    hold(0, t);
+    OK(plant_step(plant, 0.01));
+}
+
+TEST(overlapping_bands_stay_within_the_outer_loop)
+{
+    set("austenite_start_c", 72.0); /* below M_s */
+    on("latent_heat");
+    on("resistance_phase");
+    uncouple();
+    random_state = 5;
+    double before = 0.0;
+    for (int k = 0; k < 3000; k++) {
+        const double t = 60.0 + 45.0 * uniform();
+        const double from = at(0);
+        lead(t);
+        const double fraction = plant_austenite(plant, 0);
+        const double rise = t <= 72 ? 0 : t >= 98 ? 1 : 0.5 - 0.5 * cos(PI * (t - 72) / 26);
+        const double fall = t <= 68 ? 0 : t >= 78 ? 1 : 0.5 - 0.5 * cos(PI * (t - 68) / 10);
+        TEST_ASSERT_TRUE(fraction >= rise - 1e-12 && fraction <= fall + 1e-12);
+        TEST_ASSERT_TRUE(t >= from ? fraction >= before : fraction <= before);
+        before = fraction;
+    }
+}
+
+TEST(turning_within_overlapping_bands_does_not_jump)
+{
+    set("austenite_start_c", 72.0);
+    lead(120.0);
+    lead(75.5);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, 0.85355339, plant_austenite(plant, 0));
+    lead(75.501);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.85355339, plant_austenite(plant, 0));
+    lead(75.5);
+    lead(75.499);
+    TEST_ASSERT_DOUBLE_WITHIN(3e-4, 0.85355339, plant_austenite(plant, 0));
+}
+
+TEST(a_logged_load_moves_them_by_so_much_a_newton)
+{
+    on("transformation_shift");
+    set("transformation_shift_k[1]", 2.0);
+    set("transformation_shift_k_per_n", 4.0);
+    set("load_n[1]", 1.0); /* 6 K in all */
+    lead(99.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, plant_austenite(plant, 0));
+    set("load_n[1]", 0.0); /* the load is taken off: on at once to where 2 K would be */
+    OK(plant_step(plant, 0.01));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5 - 0.5 * cos(PI * 0.9), plant_austenite(plant, 0));
+    hold(1, 93.0);
+    OK(plant_step(plant, 0.01));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, plant_austenite(plant, 1));
+}
+
+TEST(a_load_on_a_held_spring_leaves_its_heat_with_whatever_holds_it)
+{
+    uncouple();
+    set("loss_w_per_k", 0.0);
+    on("latent_heat");
+    on("transformation_shift");
+    lead(100.0);
+    lead(83.0);
+    const double before_j = plant_energy_input_j(plant);
+    set("transformation_shift_k[1]", 10.0);
+    OK(plant_step(plant, 1.0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, plant_austenite(plant, 0));
+    TEST_ASSERT_EQUAL_DOUBLE(83.0, at(0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, -0.5 * get("latent_heat_j"),
+                              plant_energy_input_j(plant) - before_j);
+}
+
+/* ---- contacts and convection ---- */
+
+/* A sensor at the terminals sees the contact; the spring does not feel it. */
+TEST(a_contact_takes_voltage_and_keeps_its_heat)
+{
+    uncouple();
+    on("contact_resistance");
+    set("contact_ohm[1]", 0.03);
+    drive(0, PLANT_DRIVE_CURRENT, 1.2);
+    drive(1, PLANT_DRIVE_CURRENT, 1.2);
+    settle();
+    TEST_ASSERT_EQUAL_DOUBLE(at(1), at(0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.2 * 0.03,
+                              plant_voltage_v(plant, 0) - plant_voltage_v(plant, 1));
+    /* driven by what is measured at the terminals, less than that heats it */
+    const double measured_w = 1.2 * plant_voltage_v(plant, 0);
+    drive(0, PLANT_DRIVE_POWER, measured_w);
+    settle();
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, at(1), at(0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.2, plant_current_a(plant, 0));
+    /* a stage gives less current through it, from the moment it appears */
+    drive(0, PLANT_DRIVE_DUTY, 0.1);
+    drive(1, PLANT_DRIVE_DUTY, 0.1);
+    TEST_ASSERT_TRUE(plant_current_a(plant, 0) < 0.95 * plant_current_a(plant, 1));
+    set("contact_ohm[1]", 0.0);
+    OK(plant_step(plant, 0.02));
+    TEST_ASSERT_EQUAL_DOUBLE(plant_current_a(plant, 1), plant_current_a(plant, 0));
+}
+
+TEST(correlations_against_the_table)
+{
+    /* Incropera and DeWitt, table A.4 */
+    TEST_ASSERT_DOUBLE_WITHIN(0.005 * 20.92e-6, 20.92e-6, convection_air_viscosity_m2_per_s(350));
+    TEST_ASSERT_DOUBLE_WITHIN(0.005 * 26.41e-6, 26.41e-6, convection_air_viscosity_m2_per_s(400));
+    TEST_ASSERT_DOUBLE_WITHIN(0.005 * 30.0e-3, 30.0e-3, convection_air_conductivity_w_per_mk(350));
+    /* worked out by hand at a film of 62.5 degC: nu 19.4e-6, k 29.1e-3, Ra 2.37 */
+    TEST_ASSERT_DOUBLE_WITHIN(0.3, 34.1, convection_natural_w_per_m2k(8e-4, 105, 20));
+    /* Re 25.9, Nu 2.76 */
+    TEST_ASSERT_DOUBLE_WITHIN(0.8, 100.3, convection_forced_w_per_m2k(8e-4, 0.63, 105, 20));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, convection_forced_w_per_m2k(8e-4, 0.0, 105, 20));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 10.0, convection_mixed(10.0, 0.0));
+
+    uncouple();
+    on("natural_convection");
+    set("convection_correlation", 1);
+    hold(0, 105.0);
+    settle();
+    TEST_ASSERT_DOUBLE_WITHIN(0.1e-3 * 85, 5.8e-3 * 85, plant_power_w(plant, 0));
+    OK(plant_set_fan(plant, 1.0));
+    settle();
+    TEST_ASSERT_DOUBLE_WITHIN(0.2e-3 * 85, 11.3e-3 * 85, plant_power_w(plant, 0));
 }
