@@ -144,12 +144,6 @@ def test_what_a_board_had_is_a_file_that_upload_takes(fake: FakeBoard, tmp_path:
     assert fake.settings == HAD
 
 
-def test_what_is_not_saved_is_not_kept(fake: FakeBoard, tmp_path: Path, home: Path) -> None:
-    (tmp_path / "s.txt").write_text("$loss_w_per_k=0.006000\n")
-    assert ninespring("upload", "--no-save", "--port", fake.port, tmp_path / "s.txt")[0] == 0
-    assert not list(home.rglob("*.txt"))
-
-
 def test_settings_as_a_file_that_diffs(fake: FakeBoard, tmp_path: Path) -> None:
     assert ninespring("settings", "read", "--port", fake.port, "-o", tmp_path / "a.txt")[0] == 0
     lines = (tmp_path / "a.txt").read_text().splitlines()
@@ -168,12 +162,6 @@ def test_settings_as_a_file_that_diffs(fake: FakeBoard, tmp_path: Path) -> None:
     # what was read goes back onto a board, comments and all
     upload(fake, tmp_path, *lines)
     assert fake.settings["loss_w_per_k"] == "0.005800"
-    fake.settings["loss_w_per_k"] = "0.007000"
-    _, said = ninespring("settings", "read", "--port", fake.port, "--changed")
-    assert [line for line in said.splitlines() if line[0] == "$"] == [
-        "$loss_w_per_k=0.007000  # built in: 0.005800",
-        "$ambient_c=21.00  # built in: 20.00",
-    ]
 
 
 def test_a_diff_is_of_settings(tmp_path: Path) -> None:

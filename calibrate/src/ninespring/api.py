@@ -177,7 +177,7 @@ def chip_settings(model: Model | str | Path, force: bool = False) -> Settings:
     return checked_settings(_model(model), "", force)[0]
 
 
-def upload(port: str, settings: str, save: bool = True) -> int:
+def upload(port: str, settings: str) -> int:
     """Send console lines (`chip_settings(model).lines`) to a board, read them back, save them: `ninespring upload`.
 
     Return how many. WorkError, and nothing is saved, where the board refuses one or shows another value. What was saved can be
@@ -185,14 +185,14 @@ def upload(port: str, settings: str, save: bool = True) -> int:
     """
     given = settings_in(settings, "settings")
     with Board(port, off_at_end=False) as board:
-        history.send(board, given, "ns.upload", save)
+        history.send(board, given, "ns.upload")
     return len(given)
 
 
-def undo_upload(port: str, save: bool = True) -> list[str]:
+def undo_upload(port: str) -> list[str]:
     """Give a board back what it had before the last upload from this computer: `ninespring upload --undo`. Return what changed."""
     with Board(port, off_at_end=False) as board:
-        return history.undo(board, save).words()
+        return history.undo(board).words()
 
 
 def verify(model: Model | str | Path, log: Log, before: str = "") -> tuple[float, float]:

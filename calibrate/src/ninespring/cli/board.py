@@ -104,10 +104,9 @@ Examples:
 @click.argument("settings", type=FILE, required=False)
 @PORT
 @click.option("--undo", is_flag=True, help="give the board back what it had before the last upload from this computer")
-@click.option("--save/--no-save", default=True, help="keep them in the EEPROM")
 @click.option("--wait", is_flag=True, help="first wait until the board believes its springs cold")
 @JSON
-def upload(settings: Path | None, port: str, undo: bool, save: bool, wait: bool, json_path: Path | None) -> None:
+def upload(settings: Path | None, port: str, undo: bool, wait: bool, json_path: Path | None) -> None:
     """Send exported settings to a board, read them back, save them.
 
     Nothing is saved unless the board took every line and shows every value in `$$`. What the board has learnt of its
@@ -122,15 +121,15 @@ def upload(settings: Path | None, port: str, undo: bool, save: bool, wait: bool,
             board.cool(say)
         warm = board.warm()
         if settings and given:
-            history.send(board, given, f"upload {settings.name}", save, say)
-            result = results.Upload(settings=len(given), saved=save)
+            history.send(board, given, f"upload {settings.name}", say)
+            result = results.Upload(settings=len(given), saved=True)
             said = [f"{len(given)} settings sent and read back"]
         else:
-            last = history.undo(board, save)
-            result = results.Upload(settings=len(last.sent), saved=save, undone=last.by)
+            last = history.undo(board)
+            result = results.Upload(settings=len(last.sent), saved=True, undone=last.by)
             said = [*last.words(back=True), f"`{last.by}` of {last.when} is taken back"]
     write({json_path: results.checked(result)})
-    out.print("\n".join(said) + (", saved" if save else ""))
+    out.print("\n".join(said) + ", saved")
     if warm:
         err.print(
             f"warm, as the board believes: {', '.join(f'spring {k} ({t:.0f} degC)' for k, t in warm.items())}: a drive may end in "

@@ -25,16 +25,14 @@ def _of_port(port: str) -> tuple[str, dict[str, str]]:
 
 @command(
     """\b
-Examples:
+Example:
   ninespring settings read --port /dev/ttyACM0 -o board.txt
-  ninespring settings read --port /dev/ttyACM0 --changed
 """,
     of=settings,
 )
 @PORT
 @output("file to write; - prints it", default=Path("-"))
-@click.option("--changed", is_flag=True, help="only those that are not as built in")
-def read(port: str, output: Path, changed: bool) -> None:
+def read(port: str, output: Path) -> None:
     """Write a board's settings as console lines, one a line and in the board's order: two such files diff, `upload` takes one.
 
     Behind each stands what is built in, where it is another.
@@ -45,8 +43,7 @@ def read(port: str, output: Path, changed: bool) -> None:
         row = tables.setting(name)  # None: this version does not know it
         usual = f"{row.default:.{row.decimals}f}" if row else ""
         same = bool(usual) and float(usual) == float(value)
-        if not (changed and same):
-            lines.append(f"${name}={value}" + (f"  # built in: {usual}" if usual and not same else ""))
+        lines.append(f"${name}={value}" + (f"  # built in: {usual}" if usual and not same else ""))
     write({output: "\n".join([f"# from {port}: {version}", *lines]) + "\n"})
     if str(output) != "-":
         out.print(f"{len(lines)} settings -> {output}", soft_wrap=True)

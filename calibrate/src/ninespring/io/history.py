@@ -95,17 +95,15 @@ def send(
     board: Board,
     settings: Mapping[str, str],
     by: str,
-    save: bool = True,
     say: Callable[[str, int], None] = lambda line, count: None,
 ) -> None:
-    """Send settings to a board, read them back, save them; what it had before is kept, where they are saved."""
+    """Send settings to a board, read them back, save them; what it had before is kept."""
     before = board.settings()
-    send_settings(board, settings, save, say)
-    if save:
-        keep(board.port, board.version[0], by, before, settings)
+    send_settings(board, settings, say=say)
+    keep(board.port, board.version[0], by, before, settings)
 
 
-def undo(board: Board, save: bool = True) -> Entry:
+def undo(board: Board) -> Entry:
     """Give a board back what it had before the last upload; the settings that were not sent then stay as they are.
 
     WorkError where nothing is kept of it, or where it has something else than was sent.
@@ -120,6 +118,6 @@ def undo(board: Board, save: bool = True) -> Entry:
             f"the board has not what `{last.by}` sent on {last.when}: {'; '.join(other[:3])}. It is another board, or was set "
             f"since; {last.path} holds what was kept, `ninespring upload` takes it"
         )
-    send_settings(board, {name: last.before[name] for name in last.sent if name in last.before}, save)
+    send_settings(board, {name: last.before[name] for name in last.sent if name in last.before})
     last.path.rename(last.path.with_suffix(UNDONE))
     return last
