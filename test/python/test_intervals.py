@@ -11,7 +11,6 @@ import pytest
 from click.testing import CliRunner
 from ninespring.cli.main import cli
 from ninespring.infer.fit import Fit
-from ninespring.infer.intervals import correlations, intervals
 from ninespring.model.spec import Free, Spec
 
 FREE = (
@@ -28,23 +27,20 @@ def fitted() -> Fit:
 
 
 def test_an_interval_is_in_the_coordinate_that_was_fitted_and_within_the_bounds() -> None:
-    found = intervals(fitted())
+    found = fitted().intervals()
     assert list(found) == ["loss", "shift"]
     assert found["loss"] == pytest.approx((0.006 * math.exp(-0.196), 0.006 * math.exp(0.196)), rel=1e-4)
     assert found["shift"] == pytest.approx((0.5 - 1.96, 1.0), abs=1e-4)
-    assert intervals(fitted(), 0.6827)["loss"] == pytest.approx(
-        (0.006 * math.exp(-0.1), 0.006 * math.exp(0.1)), rel=1e-4
-    )
 
 
 def test_a_number_that_the_data_hardly_fix_lies_anywhere_within_its_bounds() -> None:
     hardly = Fit(Spec(free=FREE[:1]), np.array([0.006]), 0.0, 10, [], covariance=np.array([[1e6]]))
-    assert intervals(hardly)["loss"] == (0.001, 0.1)
+    assert hardly.intervals()["loss"] == (0.001, 0.1)
 
 
 def test_errors_that_go_together_are_told_without_those_that_nothing_fixes() -> None:
-    assert correlations(fitted()) == [("shift", "loss", pytest.approx(0.8))]
-    assert correlations(fitted(), 0.9) == []
+    assert fitted().correlations(0.1) == [("shift", "loss", pytest.approx(0.8))]
+    assert fitted().correlations(0.9) == []
 
 
 def test_fit_tells_intervals_and_correlations(make_log, tmp_path: Path) -> None:

@@ -11,7 +11,6 @@ from ..export.settings import left_out
 from ..find import board_alone, diagnosis, doubt, steady
 from ..infer import from_resistance
 from ..infer.fit import Fit
-from ..infer.intervals import TOLD, correlations, intervals
 from ..infer.problem import Problem
 from ..infer.result import parameters_of
 from ..io import results
@@ -36,8 +35,10 @@ from .console import (
     write,
 )
 
+TOLD = 0.1
+"""Correlations below this are not told ..."""
 MOST_TOLD = 8
-"""Correlations that are printed."""
+"""... and so many are printed."""
 
 
 @command("""\b
@@ -109,14 +110,14 @@ def _result(
 ) -> results.Fit:
     """Return a fit's numbers, each with the interval in which it lies in 95 of 100 cases, and its errors."""
     numbers = {k: v for e in (None, *found.spec.effects) for k, v in parameters_of(problem, found, e).items()}
-    for name, ends in intervals(found).items():
+    for name, ends in found.intervals().items():
         numbers[name].interval_95 = ends
     return results.Fit(
         logs=logs_of(runs),
         **dict.fromkeys(("rmse_before_c", "rmse_c", "holdout_rmse_c", "noise_c")) | errors,
         effects=list(found.spec.effects),
         parameters=numbers,
-        correlations=[results.Correlation(a=a, b=b, correlation=value) for a, b, value in correlations(found)],
+        correlations=[results.Correlation(a=a, b=b, correlation=value) for a, b, value in found.correlations(TOLD)],
         not_identifiable=sorted(found.stuck),
         at_bounds=found.at_bounds(),
         warnings=warnings,

@@ -10,6 +10,9 @@ import numpy as np
 from ..model.spec import Spec
 from .likelihood import Colour
 
+NORMAL_95 = 1.959964
+"""Standard deviations within which a normal number lies in 95 of 100 cases."""
+
 
 @dataclass
 class Fit:
@@ -61,19 +64,32 @@ class Fit:
             out[f.key] = inner * (abs(self.values[k]) if f.log else f.scale)
         return out
 
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """Return where each number lies in 95 of 100 cases, in its own unit; numbers that the data cannot fix are left out.
+
+        Symmetric in the coordinate in which it was fitted, for one that is fitted by its logarithm in proportion; within its bounds.
+        """
+        out: dict[str, tuple[float, float]] = {}
+        for k, free in enumerate(self.spec.free):
+            if self.covariance is not None and free.key not in self.stuck:
+                at, error = free.inner(float(self.values[k])), math.sqrt(max(0.0, float(self.covariance[k, k])))
+                out[free.key] = free.outer(at - NORMAL_95 * error), free.outer(at + NORMAL_95 * error)
+        return out
+
     def correlations(self, limit: float = 0.98) -> list[tuple[str, str, float]]:
-        """Return pairs of numbers whose errors are correlated beyond `limit`."""
+        """Return pairs of numbers whose errors are correlated beyond `limit`, strongest first."""
         if self.covariance is None:
             return []
         deviation = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
         rho = self.covariance / np.outer(deviation, deviation)
         keys = [f.key for f in self.spec.free]
-        return [
+        pairs = [
             (keys[a], keys[b], float(rho[a, b]))
             for a in range(len(keys))
             for b in range(a)
             if abs(rho[a, b]) > limit and keys[a] not in self.stuck and keys[b] not in self.stuck
         ]
+        return sorted(pairs, key=lambda one: -abs(one[2]))
 
     def at_bounds(self) -> list[str]:
         """Return keys of numbers at a bound."""
