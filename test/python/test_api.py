@@ -8,7 +8,6 @@ from pathlib import Path
 import ninespring as ns
 import numpy as np
 import pytest
-from command import ninespring
 from fake_board import FakeBoard, row
 from made import ROOT, SIM
 from ninespring.cli.main import COMMANDS
@@ -100,15 +99,6 @@ def test_a_board_that_tells_nothing_of_its_springs_still_streams() -> None:
     with ns.Board(fake.port) as board:
         now = next(board.stream())
         assert np.isnan(now.low_c).all() and now.current_a.tolist() == [1.0]
-
-
-@pytest.mark.parametrize(("name", "begins"), [("p.png", b"\x89PNG"), ("p.svg", b"<?xml"), ("p.gif", b"GIF89a")])
-def test_plot_draws_a_log(make_log, tmp_path: Path, name: str, begins: bytes) -> None:
-    log = make_log(seconds=12)
-    done = ninespring("plot", log, "-o", tmp_path / name)
-    assert done.returncode == 0, done.stderr
-    assert (tmp_path / name).read_bytes().startswith(begins)
-    assert sorted(one.name for one in tmp_path.iterdir()) == sorted([name, log.name])
 
 
 def test_a_log_where_a_model_belongs_is_said(make_log) -> None:

@@ -59,23 +59,6 @@ def test_a_picture_of_a_time_that_the_log_does_not_have_is_refused(make_log, tmp
     assert done.stderr.endswith("run.csv: --at 640: its time_s runs from 540.5 to 639.5 s\n")
 
 
-def test_fit_with_an_effect_writes_a_model(make_log, tmp_path: Path) -> None:
-    log = make_log(effects={"sensor_lag": {"sensor_lag_s": 6.0}})
-    done = ninespring(
-        "fit",
-        "--effects",
-        "sensor_lag",
-        log,
-        "-o",
-        tmp_path / "m.toml",
-        "--json",
-        tmp_path / "f.json",
-    )
-    assert done.returncode == 0, done.stderr
-    value = json.loads((tmp_path / "f.json").read_text())["parameters"]["sensor_lag_s"]["value"]
-    assert value == pytest.approx(6.0, rel=0.1)
-
-
 STEADY = """case,pitch_mm,fan,ambient_c,hold1_c,hold2_c,hold3_c,hold4_c,hold6_c,hold7_c,hold8_c,hold9_c,t5_c
 a,4,0,20,99,99,99,99,99,99,99,99,63
 b,5,0,20,99,99,99,99,99,99,99,99,57

@@ -835,17 +835,6 @@ def test_settings_have_units_and_ranges_and_a_refusal_is_in_the_boards_words(pag
 
 
 @on_a_page
-def test_one_click_records_a_log_that_can_be_read(page: Page, simulated: tuple[Dashboard, Path]) -> None:
-    page.click("#record")
-    expect(page.locator("#recording")).to_contain_text(re.compile(r": [1-9]\d rows"))
-    page.click("#record")
-    expect(page.locator("#log li").first).to_contain_text("rows in")
-    (log,) = simulated[1].glob("*.csv")
-    assert log.read_text().startswith("# recorded: ") and "\n# $loss_w_per_k=" in log.read_text()
-    assert read_log(log, 9, temperatures=False).duration_s > 0.9
-
-
-@on_a_page
 def test_patterns_are_shared_by_a_link_that_drives_nothing(page: Page) -> None:
     page.click("#draw button:nth-child(5)")
     page.click("#add")

@@ -71,11 +71,6 @@ def test_the_missing_effect_is_named_with_its_number(make_log, effect: str, numb
     assert (effect in found.model.effects) and result["effects"][0]["on_chip"] == on_chip
 
 
-def test_two_effects_that_hide_one_another_are_both_found(make_log) -> None:
-    both = {"sensor_lag": {"sensor_lag_s": 5.0}, "edge_loss": {"edge_loss_fraction": 0.15}}
-    assert set(names(diagnosis.diagnose(Array(), [read_log(make_log(effects=both, seed=2))]).result)) == set(both)
-
-
 @pytest.mark.nightly
 def test_each_spring_is_its_own_beside_a_law_of_all(make_log) -> None:
     """Springs that lie 4 % apart: one name of one spring or its thermometer after the other stood in for them."""
@@ -115,18 +110,6 @@ def test_what_is_not_believed_leaves_its_place_to_another(make_log, monkeypatch:
     result = diagnosis.diagnose(Array(), [read_log(make_log(effects=strong, seed=3))]).result
     assert judged[0] == "natural_convection" and len(judged) > 1
     assert names(result) and "natural_convection" not in names(result)
-
-
-@pytest.mark.nightly
-def test_what_no_effect_explains_is_called_unexplained(make_log) -> None:
-    def gusts(columns: dict[str, np.ndarray]) -> None:
-        for k in range(1, 10):
-            columns[f"t{k}_c"] = columns[f"t{k}_c"] + 2.0 * np.sign(np.sin(np.arange(600.0) / 13))
-
-    result = diagnosis.diagnose(Array(), [read_log(make_log(change=gusts))]).result
-    assert result["unexplained"] is True
-    assert names(result) == []
-    assert result["residual"]["depends_on"]
 
 
 def test_a_clock_that_runs_ahead_is_said(make_log) -> None:

@@ -159,14 +159,6 @@ def test_bounds_hold_and_are_reported(make_log) -> None:
     assert fit.at_bounds() == ["edge_loss_fraction"]
 
 
-def test_a_copy_of_a_plant_leads_its_own_life() -> None:
-    plant = native.Plant(1, 1)
-    twin = plant.copy()
-    twin.set("loss_w_per_k", 0.02)
-    twin.set_temperature(0, 50.0)
-    assert plant.get("loss_w_per_k") == 0.0058 and plant.temperature_c()[0] == 20.0
-
-
 def test_springs_start_where_the_sensors_would_show_the_first_row() -> None:
     plant = native.Plant(1, 2)
     plant.set_effects(["sensor_gain", "optical_mixing"])

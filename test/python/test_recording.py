@@ -32,7 +32,7 @@ from ninespring.io import recording, thermometers
 from ninespring.io.board import Board
 from ninespring.io.logs import read_log, read_table
 from ninespring.io.port import Port
-from ninespring.io.recording import RowCheck, script_lines
+from ninespring.io.recording import RowCheck
 from ninespring.io.thermometers import Lines
 from ninespring.say.monitoring import Screen
 from rich.console import Console
@@ -490,11 +490,6 @@ def test_telemetry_left_on_by_someone_else_does_not_confuse(tmp_path: Path) -> N
         assert found.version[0].startswith("ninespring 9.9.9")
         board.settings = {"rows": "1"}
         assert found.settings() == {"rows": "1"}
-
-
-def test_scripts_take_comments_and_units_as_scenarios_do() -> None:
-    steps = script_lines("ambient 21\n\nat 5 = on 1  # first\nat 5.5 = off all ; then\n", "s", 6.0)
-    assert [(one.line, one.at_s) for one in steps] == [("ambient 21", None), ("on 1", 5.0), ("off all", 5.5)]
 
 
 # thermometers
