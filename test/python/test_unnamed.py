@@ -355,11 +355,3 @@ def test_no_part_loses_more_than_all() -> None:
         told("gust", "all losses change, {}", -0.9)[0].possible
         and told("heat", "spring 1 is given heat, {}", -2.0)[0].possible
     )
-
-
-def test_jumps_that_go_on_one_way_are_a_drift() -> None:
-    jumps = told("sensor", "all thermometers jump, {} of run 1", 0.3, 0.2, 0.3)
-    (drift,) = unnamed.drifts(jumps)
-    assert drift.told().text.startswith("all thermometers drift, 60 to 899 s of run 1: 0.80 K")
-    assert unnamed.drifts(jumps[:2]) == jumps[:2]
-    assert len(unnamed.drifts(told("sensor", "all thermometers jump, {}", 0.3, -0.3, 0.3))) == 3

@@ -360,7 +360,7 @@ def _diagnose(
         unexplained=bool(left_over),
         unknown_heat=heat.told(),
         runs_differ=differ,
-        unnamed=[one.told() for one in unnamed.drifts(case.hidden) if _counts(one)],
+        unnamed=[one.told() for one in case.hidden if _counts(one)],
         resistance=second.told if second else results.UNSET,
         residual=residual,
         candidates=tried[:40],

@@ -50,8 +50,6 @@ UNITS = {
 """Of a cause's size; the others are parts of what they take from."""
 ROOM_K = 10.0
 """What a room can change by while somebody measures."""
-DRIFT = 3
-"""Jumps of the same thermometers one way, from which they drift: two may be two."""
 LESS = (("is given heat", "loses heat"), ("shows more of", "shows less of"), ("are warmer", "are cooler"))
 """What is said where the size is negative."""
 SHARE = 0.1
@@ -107,21 +105,6 @@ class Hidden:
         return results.Unnamed(
             kind=self.cause.kind, size=self.size, stderr=self.error, unit=unit, text=f"{text}: {said}"
         )
-
-
-def drifts(hidden: Sequence[Hidden]) -> list[Hidden]:
-    """Return unnamed causes as they are told: jumps of the same thermometers that go on and on one way are a drift."""
-    ways = [(one.cause.text, one.rows[1], one.size > 0.0) if one.cause.kind == "sensor" else id(one) for one in hidden]
-    out = []
-    for n, (one, way) in enumerate(zip(hidden, ways, strict=True)):
-        jumps = [other for other, same in zip(hidden, ways, strict=True) if same == way]
-        if len(jumps) < DRIFT:
-            out.append(one)
-        elif way not in ways[:n]:
-            first = min(jumps, key=lambda jump: jump.rows[0])
-            size, error = sum(jump.size for jump in jumps), math.hypot(*(jump.error for jump in jumps))
-            out.append(replace(first, text=first.text.replace(" jump", " drift"), size=size, error=error))
-    return out
 
 
 Beside = tuple[Search, Found, list[Hidden]]
