@@ -24,7 +24,6 @@ from ninespring.io.logs import log_text, read_log
 from ninespring.io.logs.run import Run
 from ninespring.io.recording import script_lines
 from ninespring.model import effects, native
-from ninespring.model.effects.runs_differ import ALIKE
 from ninespring.model.models import Array, Model, model_text, read_model
 from ninespring.model.spec import Spec
 from two_heaters import levels
@@ -190,21 +189,6 @@ def test_where_the_room_of_the_only_run_is_bends_nothing(tmp_path: Path) -> None
     two = [one for one in found.candidates if one.effect == "run_ambient_offset"]
     drift = [one for one in found.candidates if one.effect == "ambient_drift" and one.flexible]
     assert len(two) == 1 and not two[0].flexible and all(len(one.free) > 1 for one in drift)
-
-
-@pytest.mark.parametrize(("runs", "variant", "taken"), [(1, "", True), (2, "", False), (2, ALIKE, True)])
-def test_what_is_a_runs_own_gives_way_to_what_is_the_same_in_all_only_where_there_are_several(
-    monkeypatch: pytest.MonkeyPatch, runs: int, variant: str, taken: bool
-) -> None:
-    one, other = (
-        Fit(Spec((name,), variant=((name, variant),)), np.array([]), 1.0, 1, [])
-        for name, variant in (("run_ambient_offset", variant), ("sensor_gain", ""))
-    )
-    one.sse = other.sse = 1.0
-    monkeypatch.setattr(search, "log_evidence", lambda problem, better, fit: 2.0 if better is one else -2.0)
-    problem = SimpleNamespace(budget=budget.Budget(), runs=[None] * runs)
-    found = search.Search(problem, [], one)  # type: ignore[arg-type]
-    assert found.preferred(one, other) is taken and found.preferred(other, one) is not taken
 
 
 def test_what_is_better_and_fitted_takes_its_place_though_nothing_further_may_be_begun() -> None:

@@ -315,7 +315,6 @@ def _diagnose(
     problem = case.problem
     progress("a run that the fit never saw")
     headline = _foretold(case, judge, judged_by)
-    case.final = runs_apart.with_spread(problem, case.final)
     left_over = unexplained(problem, case.final) or bool(case.hidden)
     strength = {e: log_evidence(problem, case.final, case.without[e]) for e in case.adopted}
     steps = in_order(case.search, case.base, case.final, case.adopted)

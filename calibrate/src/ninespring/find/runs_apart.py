@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..infer.fit import Fit
@@ -11,11 +9,9 @@ from ..infer.problem import Problem
 from ..infer.result import parameters_of
 from ..io import results
 from ..model import effects
-from ..model.spec import RUN_DRIVE, RUNS_OWN
+from ..model.spec import RUN_DRIVE
 from .certainty import CERTAIN, NAMED, Witness
 
-ROUNDS = 3
-"""Of fitting the runs' numbers and their spread in turn (expectation maximisation): more moves neither."""
 LEAST_APART = 0.01
 """Part by which springs lie apart at least: none are made better."""
 
@@ -50,18 +46,6 @@ def springs_apart(fit: Fit, each: effects.Candidate) -> dict[str, float]:
     for free in each.free:
         z.setdefault(free.key.partition("[")[0], []).append(free.inner(fit.value(free.key)))
     return {name: max(LEAST_APART, float(np.std(of_each, ddof=1))) for name, of_each in z.items()}
-
-
-def with_spread(problem: Problem, fit: Fit) -> Fit:
-    """Return the fit with what is a run's own believed to lie as far apart as it does; not of a run alone of which more is known."""
-    mine = [effect for effect in fit.spec.effects if effect in RUNS_OWN]
-    for _ in range(ROUNDS if mine else 0):
-        spread = {effect: max(1e-6, spread_of(fit, effect)) for effect in mine}
-        free = tuple(
-            replace(f, prior=spread.get(f.effect or "", f.prior)) if f.absent is None else f for f in fit.spec.free
-        )
-        fit = problem.fit(replace(fit.spec, free=free), fit.as_dict(), tolerance=1e-5, errors=True)
-    return fit
 
 
 def entry(problem: Problem, fit: Fit, effect: str, nats: float, sure: Witness) -> results.RunsDiffer:

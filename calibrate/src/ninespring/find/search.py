@@ -18,8 +18,7 @@ from ..infer.fit import Fit
 from ..infer.problem import Problem
 from ..model import effects
 from ..model.effects import Candidate
-from ..model.effects.runs_differ import ALIKE
-from ..model.spec import RUNS_OWN, Spec
+from ..model.spec import Spec
 from .evidence import difference, excess, fit_factor, gain, log_evidence, relief
 from .screen import Screen
 
@@ -224,17 +223,7 @@ class Search:
         return gain(better, other) >= MIN_GAIN and explained >= share * beyond
 
     def preferred(self, one: Fit, other: Fit) -> bool:
-        """Return whether `one` takes the place of `other`, which has as many effects.
-
-        What is a run's own does so only where it explains more that matters than what is the same in all runs, if there are
-        several.
-        """
-        if len(self.problem.runs) > 1:
-            own = [sum(e in RUNS_OWN and v != ALIKE for e, v in fit.spec.variant) for fit in (one, other)]
-            if own[0] > own[1] and gain(one, other) < MIN_GAIN:
-                return False
-            if own[0] < own[1] and gain(other, one) < MIN_GAIN:
-                return True
+        """Return whether `one` takes the place of `other`, which has as many effects."""
         return log_evidence(self.problem, one, other) > self.handicap(one, other)
 
     def candidate_of(self, fit: Fit, effect: str) -> Candidate | None:
