@@ -101,8 +101,8 @@ def test_the_report_shows_what_was_found_and_needs_nothing_else(found: diagnosis
         "What was tried",
         "The declared model's numbers",
     ]
-    # the map of the first screen; two runs, temperatures and residuals; maps
-    assert page.figures == 6
+    # the map of the first screen; two runs, temperatures and residuals; maps; autocorrelation
+    assert page.figures == 7
     assert ["latent_heat + sensor_lag", "adopted"] in [[row[0], row[-1]] for row in page.rows]
     before, after = result["baseline"], result["after"]
     for row, one in (("before: the declared model", before), ("after: with the effects adopted", after)):

@@ -12,6 +12,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from ..find.diagnosis import Diagnosis
+from ..infer.fit import Fit
 from ..io import statistics
 from ..io.logs.run import Run
 
@@ -137,11 +138,15 @@ def _tiles(
     return shown
 
 
+def _in_noise(found: Diagnosis, fit: Fit) -> list[np.ndarray]:
+    """Return what a fit leaves, in multiples of each sensor's noise: (rows, springs) a run."""
+    return [left / noise for left, noise in zip(fit.residual, found.problem.noise, strict=True)]
+
+
 def array_map(found: Diagnosis) -> Markup:
     """Draw what is left at each spring in multiples of its sensor's noise, with a colour bar."""
     shape = (found.problem.array.rows, found.problem.array.cols)
-    in_noise = [left / noise for left, noise in zip(found.final.residual, found.problem.noise, strict=True)]
-    rms = np.sqrt(statistics.mean_there(np.concatenate(in_noise) ** 2, 0))
+    rms = np.sqrt(statistics.mean_there(np.concatenate(_in_noise(found, found.final)) ** 2, 0))
     cell = 3.0 / max(shape[1], 0.9 * shape[0])
     size = (shape[1] * cell, shape[0] * cell)
     above = max(0.1, 0.75 - 0.5 * size[1])  # words beside may be longer than what they stand beside
@@ -198,4 +203,33 @@ def maps(found: Diagnosis) -> Markup:
     for k, (axis, (values, title, colours, form)) in enumerate(zip(axes[0], pictures, strict=True)):
         _tiles(axis, values, shape, colours, -most[1] if k % 2 else 0.0, most[k % 2], form)
         axis.set_title(title, fontsize=9)
+    return as_svg(figure)
+
+
+def autocorrelation(found: Diagnosis) -> Markup:
+    """Draw what is left: its autocorrelation and its distribution."""
+    problem = found.problem
+    lags = min(120, problem.longest_lag())
+    step = float(np.median(np.diff(problem.runs[0].time_s)))
+    figure, (axes,) = panels(1, 2, (5.2, 2.3), (0.6, 0.1, 0.5, 0.3), (0.7, 0.0))
+    for fit, colour, label in ((found.baseline, BEFORE, "before"), (found.final, AFTER, "after")):
+        left = _in_noise(found, fit)
+        rho = statistics.autocorrelation(left, lags)
+        axes[0].plot(np.arange(1, lags + 1) * step, rho[1:], color=colour, label=label)
+        values = np.concatenate([one[np.isfinite(one)] for one in left])
+        axes[1].hist(values, bins=80, range=(-6, 6), density=True, histtype="step", color=colour, label=label)
+    bound = 2 / math.sqrt(problem.count)
+    axes[0].axhspan(-bound, bound, color="#dfe5ea")
+    axes[0].set_xlabel("lag, s", fontsize=9)
+    axes[0].set_ylabel("correlation", fontsize=9)
+    axes[0].set_title("autocorrelation of the residual (grey: white noise)", fontsize=9)
+    x = np.linspace(-6, 6, 200)
+    axes[1].plot(x, np.exp(-(x**2) / 2) / math.sqrt(2 * math.pi), color=MEASURED, label="sensor noise alone")
+    axes[1].set_xlabel("residual / noise", fontsize=9)
+    axes[1].set_ylabel("density", fontsize=9)
+    axes[1].set_title("distribution of the residual", fontsize=9)
+    for axis in axes:
+        axis.legend(fontsize=8, frameon=False)
+        axis.grid(alpha=0.25)
+        axis.tick_params(labelsize=8)
     return as_svg(figure)
