@@ -115,10 +115,6 @@ void spring_keep_above(spring_estimator_t *estimator, spring_belief_t *belief,
  * so, the same way, lately. Then it is the surroundings that have changed; of one alone it may be a
  * touch, or its contact. */
 bool spring_steps_with_others(spring_estimator_t *estimator, uint8_t spring, bool hotter);
-/* All springs that are held, three at least, read more than their austenite did when it was hot: no
- * contacts do that, and an intermediate phase in none that keeps its own. They are hot. O(springs).
- */
-bool spring_all_read_hot(const spring_estimator_t *estimator);
 /* It is found in error_k (below 0: colder), by a sight that is sure to sd_k. Where that is farther
  * off than all that was known of it explains, one spring alone may have been touched, or its
  * contact has moved; where another was found so lately, the surroundings have stepped: the losses

@@ -163,14 +163,6 @@ static bool is_over(const spring_belief_t *b, float unseen_k)
            fabsf(b->ohm / b->run.heat.onset_ohm - 1.0f) > EXCESS_SEEN;
 }
 
-/* The middle of a wire that was transformed in part has had its share: its ends change what it
- * reads by less and less heat of the whole, and what its own austenite read tells whether they
- * have. */
-static bool lacks_what_it_had(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
-{
-    return b->run.heat.cold_ohm == 0.0f && spring_estimator_lacks_phase(b, model, k);
-}
-
 /* What no temperature coefficient in print makes of a change over step_k of heat. */
 static float unexplained(float change, float step_k)
 {
@@ -298,7 +290,7 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
                                       : b->ohm / b->run.heat.onset_ohm - 1.0f;
         const float unseen_k = spring_clamp(FLAT_CHANGE_K / (fabsf(change_seen) + 0.001f) - FLAT_K,
                                             0.0f, SHIFT_BOUND_K);
-        if (is_over(b, unseen_k) && !lacks_what_it_had(b, model, k)) {
+        if (is_over(b, unseen_k)) {
             see_finish(e, b, model, k, b->run.heat.flat_k - unseen_k);
             spring_note_read(e, k, change, b->noise);
         }

@@ -254,20 +254,6 @@ static bool reads_hot(const spring_belief_t *b, const thermal_model_t *model, ui
            spring_beyond_austenite(b, model, k, ohm) > spring_read_tolerance(b);
 }
 
-/* As all read hotter than what they read when they were hot, it is hotter than that: by no less
- * than the largest coefficient makes of it. */
-static void keep_as_hot_as_all(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
-                               uint8_t k)
-{
-    b->hot = reads_hot(b, model, k);
-    if (b->hot && spring_all_read_hot(e)) {
-        const float beyond = spring_beyond_austenite(b, model, k, b->slow_ohm);
-        const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
-        spring_keep_above(e, b, model, k,
-                          spring_c(finish_c7) + beyond * (1.0f / COEFFICIENT_MOST_PER_K));
-    }
-}
-
 /* What is certain to have left its line need be no lost phase: a hotter spring reads otherwise, or
  * a contact that has crept, and what goes the other way may be an intermediate phase's. While the
  * spring may be hot, or may have come to where it loses phase, it is put on trial: with less power
@@ -366,7 +352,7 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         b->losing = 0;
         return;
     }
-    keep_as_hot_as_all(e, b, model, k);
+    b->hot = reads_hot(b, model, k);
     const float left = has_left(b);
     const float distance_k2 = spring_distance_k2(b);
     const float changed = as_lost(b, left);

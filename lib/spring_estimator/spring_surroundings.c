@@ -4,7 +4,6 @@
 
 #define STEP_LASTS    0.8f  /* how much of such an error a step that lasts makes: a correlation */
 #define STEP_LATELY_S 60.0f /* a spring's time constant, C / G = 52 s */
-#define HOT_LEAST     3     /* contacts of two may have crept alike */
 
 bool spring_steps_with_others(spring_estimator_t *e, uint8_t k, bool hotter)
 {
@@ -44,21 +43,6 @@ __attribute__((noinline)) bool spring_open_to_step(spring_estimator_t *e, spring
 static bool is_held_and_read(const spring_belief_t *b)
 {
     return !b->heating && b->possible == SPRING_PHASE_AUSTENITE && spring_estimator_sees(b);
-}
-
-bool spring_all_read_hot(const spring_estimator_t *e)
-{
-    uint8_t hot = 0;
-    for (uint8_t i = 0; i < e->springs; i++) {
-        const spring_belief_t *b = &e->spring[i];
-        if (is_held_and_read(b)) {
-            if (!b->hot) {
-                return false;
-            }
-            hot++;
-        }
-    }
-    return hot >= HOT_LEAST;
 }
 
 bool spring_keeps_alone(const spring_estimator_t *e, const spring_belief_t *b, uint8_t k)

@@ -229,53 +229,6 @@ TEST(two_springs_that_are_found_colder_are_a_step)
     }
 }
 
-/* All that are held and read, three at least, read more than their austenite did when it was hot:
- * they are as hot as the largest coefficient makes of it, and none is blind by that. */
-TEST(springs_that_all_read_hot_are_hot)
-{
-    static const struct {
-        double beyond; /* of the first */
-        bool hot[2];   /* of the others */
-        bool held;     /* the last one */
-        double c;      /* austenite finish is at 98 */
-    } table[] = {
-        {0.03, {true, true}, true, 118.0}, {0.03, {true, false}, true, 80.0},
-        {0.03, {false, true}, true, 80.0}, {0.03, {true, true}, false, 80.0},
-        {0.004, {true, true}, true, 80.0},
-    };
-    for (size_t n = 0; n < ROWS(table); n++) {
-        begin_three();
-        row(n);
-        thermal_model_set_temperature(&model, 0, 110 * 128);
-        thermal_model_set_temperature(&model, 0, 80 * 128);
-        for (uint8_t k = 0; k < SPRINGS; k++) {
-            spring_belief_t *const b = &estimator.spring[k];
-            b->possible = SPRING_PHASE_AUSTENITE;
-            b->reads = true;
-            b->fresh = 200;
-            b->heating = b->blind = false;
-            b->hot = k == 0 || table[n].hot[k - 1];
-        }
-        estimator.spring[2].heating = !table[n].held;
-        spring_belief_t *const b = &estimator.spring[0];
-        b->variance_k2 = 4.0f;
-        b->covariance = -4e-4f;
-        b->loss_variance = 1e-9f;
-        b->current_a = b->slow_a = 2.0f;
-        b->noise = 1e-4f;
-        b->averaged = 16;
-        b->quiet = 100;
-        b->learnt.austenite_ohm = 0.25f;
-        b->learnt.change = 0.2f;
-        b->ohm = b->slow_ohm = (float)(0.25 * (1.0 + table[n].beyond));
-        b->run.line = (spring_line_t){.ohm = b->slow_ohm, .a = 2.0f};
-        spring_holding_watch(&estimator, b, &model, 0, 0.0f, 0.0625f);
-        TEST_ASSERT_EQUAL(table[n].beyond > 0.0053, b->hot);
-        TEST_ASSERT_FLOAT_WITHIN(0.1f, (float)table[n].c, spring_now_c(&model, 0));
-        TEST_ASSERT_FALSE(b->blind);
-    }
-}
-
 /* What it gives off less by keeping its phase, 4 sd of it, is its own but for what the others that
  * are held and read do, on average: a draught ends for all. */
 TEST(what_all_springs_keep_is_the_surroundings)

@@ -498,29 +498,6 @@ TEST(finish_is_heat_without_a_change)
     }
 }
 
-/* One that began with a part of its phase goes on until it reads what its own austenite did: its
- * ends change it by too little to be seen over heat. */
-TEST(finish_of_what_was_transformed_in_part_is_its_own_austenite)
-{
-    static const struct {
-        double ohm, cold_ohm; /* 0.25 was learnt */
-        bool over;
-    } table[] = {{0.24, 0.0, false}, {0.2485, 0.0, true}, {0.24, 0.2, true}};
-    for (size_t n = 0; n < ROWS(table); n++) {
-        begin_heating_at(95.0, B, 20.0);
-        row(n);
-        INSIDE.onset = true;
-        INSIDE.ohm = INSIDE.run.heat.mark_ohm = (float)table[n].ohm;
-        INSIDE.learnt.austenite_ohm = 0.25f;
-        INSIDE.learnt.change = 0.2f;
-        INSIDE.run.heat.cold_ohm = (float)table[n].cold_ohm;
-        INSIDE.run.heat.excess = 0.02f;
-        INSIDE.run.heat.flat_k = 12.1f;
-        spring_heating_watch(&estimator, &INSIDE, &model, 0);
-        TEST_ASSERT_EQUAL_UINT8(table[n].over ? A : B, INSIDE.possible);
-    }
-}
-
 /* While it still changes, or lacks phase that it is known to have, it is no hotter than austenite
  * finish (martensite: its onset), until the coldest and heaviest would be. Where only the level of
  * its resistance says so, which a sensor's step may have moved, that stays a doubt: it may be as
