@@ -72,6 +72,21 @@ def first_contact(board: Board) -> serial.Serial:
     raise AssertionError("the board does not answer")
 
 
+def uptime_s(port: serial.Serial) -> float:
+    port.write(b"?")
+    return float(port.readline().decode("ascii").split("|t:")[1].split("|")[0])
+
+
+def talks_like_a_board_at_its_own_pace(program: str, elf: Path) -> None:
+    """No `--speed`: no faster than a real one, whose clock it keeps."""
+    with Board(program, elf) as board, first_contact(board) as port:
+        begun_s, first_s = time.monotonic(), uptime_s(port)
+        assert ask(port, "frobnicate")[-1].startswith("error:1 ")
+        assert len([line for line in ask(port, "$$") if line.startswith("$")]) > 20
+        time.sleep(0.5)
+        assert 0 < uptime_s(port) - first_s < time.monotonic() - begun_s + 0.2
+
+
 def survives_clients_that_leave(program: str, elf: Path) -> None:
     with Board(program, elf, "--speed", "max") as board:
         first_contact(board).close()
@@ -201,6 +216,7 @@ def main() -> int:
         (waits_for_a_slow_reader,),
         (keeps_its_eeprom, here),
         (survives_clients_that_leave,),
+        (talks_like_a_board_at_its_own_pace,),
         (refuses_what_is_wrong,),
     )
     with ThreadPoolExecutor(len(tests)) as pool:  # each has boards of its own, and waits for most of its time

@@ -97,6 +97,28 @@ TEST(a_driven_spring_gets_its_current_and_only_that_one)
     TEST_ASSERT_EQUAL_UINT16(1500, controller_target_ma(&controller, 4));
 }
 
+/* Eight are on as a ninth is switched on: it waits while what flows leaves it nothing. */
+TEST(none_rises_while_what_flows_leaves_nothing)
+{
+    static const int16_t each_ma[] = {1500, 1860};
+    for (int beyond = 0; beyond < 2; beyond++) {
+        setUp();
+        for (uint8_t k = 0; k < 8; k++) {
+            TEST_ASSERT_TRUE(controller_set_target(&controller, k, 1000));
+        }
+        run(200);
+        TEST_ASSERT_TRUE(controller_set_target(&controller, 8, 1000));
+        for (int tick = 0; tick < 8; tick++) {
+            for (int k = 0; k < 8; k++) {
+                inputs.sensor[k].current_ma = each_ma[beyond];
+            }
+            run(1);
+        }
+        TEST_ASSERT_EQUAL(beyond == 0, outputs.duty[8] > 0);
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
+    }
+}
+
 /* Of one spring alone more supply is learnt, as far as it is within its tolerance; 7 V are none,
  * and a switch that lets current pass beside its duty shows as much. */
 TEST(what_is_no_circuit_teaches_nothing_of_the_supply)
