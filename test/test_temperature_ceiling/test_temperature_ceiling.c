@@ -473,6 +473,71 @@ TEST(rest_is_counted_from_the_last_power)
     TEST_ASSERT_EQUAL_UINT16(2, temperature_ceiling_rest_s(&ceiling, 4)); /* 2.4 s */
 }
 
+/* What is given counts as power at once, of springs that nobody knew of, too. */
+TEST(who_is_given_power_has_no_rest)
+{
+    ceiling.doubtful = true;
+    temperature_ceiling_begin(&ceiling, 20 * 128);
+    TEST_ASSERT_FALSE(ceiling.doubtful);
+    run(0.0f, 0, 60.0f);
+    temperature_ceiling_give(&ceiling, &model, 4);
+    TEST_ASSERT_TRUE(ceiling.delivered);
+    TEST_ASSERT_EQUAL_UINT16(0, temperature_ceiling_rest_s(&ceiling, 4));
+    TEST_ASSERT_EQUAL_UINT16(TEMPERATURE_CEILING_NEVER, temperature_ceiling_rest_s(&ceiling, 5));
+    run(0.0f, 0, 12.0f); /* its record is sound: see tearDown */
+    ceiling.temperature_c23[4] ^= 1;
+    temperature_ceiling_give(&ceiling, &model, 4);
+    TEST_ASSERT_EQUAL_UINT8(1, temperature_ceiling_broken_seals(&ceiling));
+    temperature_ceiling_begin(&ceiling, 20 * 128);
+}
+
+/* All are cold: what is kept of each is looked at before its shares are whole again. */
+TEST(what_turned_over_in_a_cold_spring_is_found_as_all_are_cold)
+{
+    ceiling.loss_share[7] ^= 1;
+    temperature_ceiling_step(&ceiling, &model, 0, 0.0f);
+    TEST_ASSERT_EQUAL_UINT8(1, temperature_ceiling_broken_seals(&ceiling));
+    TEST_ASSERT_TRUE(temperature_ceiling_is_warm(&ceiling, 7));
+    temperature_ceiling_begin(&ceiling, 20 * 128);
+}
+
+/* Up to the rise that is declared for it, with its latent heat. */
+TEST(heat_that_is_declared_is_of_both_numbers)
+{
+    const float capacity = 1e-3f * (float)parameters.heat_capacity_mj_per_k;
+    const float latent_j = 1e-3f * (float)parameters.latent_heat_mj;
+    const temperature_ceiling_declared_t declared = temperature_ceiling_declared(&model, 4);
+    TEST_ASSERT_FLOAT_WITHIN(1e-3f, capacity, declared.capacity_j_per_k);
+    TEST_ASSERT_FLOAT_WITHIN(0.05f, capacity * TEMPERATURE_CEILING_HEATED_K + latent_j,
+                             declared.heat_j);
+}
+
+/* Losses to the air that are declared lower by a third, beside a plate that takes half of them; or
+ * higher by a tenth, beside neighbours that take nothing any more: the larger change counts, and
+ * makes it hotter. */
+TEST(of_two_changes_the_larger_one_counts)
+{
+    for (int neighbours = 0; neighbours < 2; neighbours++) {
+        setUp();
+        run(0.6f, 600000u, 60.0f);
+        thermal_model_parameters_t now = neighbours ? parameters : with_plate(3000);
+        now.loss_uw_per_k = (uint16_t)((neighbours ? 1.1f : 0.67f) * (float)now.loss_uw_per_k);
+        if (neighbours) {
+            now.orthogonal_uw_per_k = now.diagonal_uw_per_k = 0;
+        }
+        ceiling.loss_share[4] = WHOLE / 2u;
+        seal_all();
+        const temperature_ceiling_losses_t was = temperature_ceiling_declared(&model, 4).now;
+        declare_model(&now);
+        const temperature_ceiling_losses_t is = temperature_ceiling_declared(&model, 4).now;
+        const float larger = neighbours ? was.with_neighbours_w_per_k / is.with_neighbours_w_per_k
+                                        : was.own_w_per_k / is.own_w_per_k;
+        TEST_ASSERT_TRUE(larger > 1.2f);
+        TEST_ASSERT_UINT16_WITHIN(WHOLE / 100u, (uint16_t)(WHOLE / 2u * larger),
+                                  ceiling.loss_share[4]);
+    }
+}
+
 /* Each bit of each spring's record, and of the ambient: it is as hot as it may be, and counted. */
 TEST(whatever_bit_turns_over_it_is_taken_to_be_hot)
 {
