@@ -70,7 +70,13 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "swarm",
         "Worlds that nobody listed: everything drawn at once",
-        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2912",
+        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2913",
+        markdown=True,
+    ),
+    Section(
+        "swarm_knows",
+        "The same, driven by whoever knows all that is true",
+        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2913 --knows",
         markdown=True,
     ),
     Section(
@@ -248,6 +254,8 @@ HEADLINES: tuple[tuple[str, tuple[tuple[str, str, str], ...]], ...] = (
             ("... of it said to be away for nothing", "swarm", "all: of that, said to be away"),
             ("back at 95 % two minutes after a draught, a door, a fan", "swarm", "all: after a lasting step"),
             ("temperature and phase within their bounds", "swarm", "all: time in which true"),
+            ("whoever knows all that is true: springs below 90 %", "swarm_knows", "all: driven springs below 90 %"),
+            ("... and runs above 120 degC", "swarm_knows", "all: runs with any spring above"),
         ),
     ),
     (

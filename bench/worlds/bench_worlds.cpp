@@ -33,7 +33,7 @@ struct options_t {
     bool learnt = false, verbose = false;
     std::string json, markdown, trace, command;
     int swarm = 0, swarm_run = -1;
-    bool gives_up = false;
+    bool gives_up = false, knows = false;
     std::string keep, against;
 };
 
@@ -381,6 +381,8 @@ int main(int argc, char **argv)
                    "Swarm: each run beside the same run of a file of --keep");
     app.add_flag("--gives-up", options.gives_up,
                  "Swarm: a controller that never heats a spring again: figures must be worse");
+    app.add_flag("--knows", options.knows,
+                 "Swarm: whoever knows all that is true drives: what is lost then, physics takes");
     app.footer(footer());
     try {
         app.parse(argc, argv);
@@ -392,8 +394,16 @@ int main(int argc, char **argv)
         options.arrays, options.seconds, options.learnt ? " --learnt" : "");
     try {
         const swarm_bench::options_t swarm{
-            options.swarm,    options.first, options.seed,     options.seconds, options.jobs,
-            options.gives_up, options.json,  options.markdown, options.keep,    options.against};
+            options.swarm,
+            options.first,
+            options.seed,
+            options.seconds,
+            options.jobs,
+            options.knows ? RUN_KNOWS : options.gives_up ? RUN_GIVES_UP : RUN_CONTROLLER,
+            options.json,
+            options.markdown,
+            options.keep,
+            options.against};
         const std::vector<int> worlds = chosen(options);
         if (options.swarm_run >= 0)
             swarm_bench::replay(swarm, options.swarm_run, options.trace);

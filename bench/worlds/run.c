@@ -4,6 +4,8 @@
 #include <string.h>
 #include <time.h>
 
+#include "knowing.h"
+
 #define TICKS_PER_S   50
 #define LEARNING_S    300.0
 #define FIRST_START_S 180.0 /* what one to eight springs may take; nine share the supply */
@@ -20,6 +22,8 @@ typedef struct {
     controller_inputs_t inputs;
     controller_outputs_t outputs;
     belief_memory_t memory;
+    uint16_t level_permille[WORLD_SPRINGS_MAX]; /* what is asked for now */
+    knowing_t knowing;
 } bench_t;
 
 static double thread_s(void)
@@ -27,6 +31,11 @@ static double thread_s(void)
     struct timespec t;
     (void)clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void ask(bench_t *bench, int k, bool on, uint16_t level_permille)
+{
+    bench->level_permille[k] = !on ? 0 : level_permille != 0 ? level_permille : 1000;
 }
 
 /* The board's power comes on, and the README's two words are typed. */
@@ -46,6 +55,9 @@ static bool power_on(bench_t *bench)
         }
     }
     controller_set_pattern(&bench->controller, bench->run->on);
+    for (int k = 0; k < world_springs(bench->world); k++) {
+        ask(bench, k, bench->run->on[k], 0);
+    }
     (void)controller_set_fan(&bench->controller, bench->run->fan_percent);
     return controller_set_policy(&bench->controller, DRIVE_POLICY_PRECOMPENSATE);
 }
@@ -124,6 +136,7 @@ static void type(bench_t *bench, score_t *score, int *typed)
         }
         controller_set_pattern(&bench->controller, command->on);
         for (int k = 0; k < world_springs(bench->world); k++) {
+            ask(bench, k, command->on[k], command->level_permille[k]);
             if (command->on[k] && command->level_permille[k] != 0) {
                 (void)controller_set_target(&bench->controller, (uint8_t)k,
                                             command->level_permille[k]);
@@ -166,8 +179,11 @@ static bool drive(bench_t *bench, run_result_t *result, FILE *trace)
         if (powered) {
             type(bench, score, &typed);
             controller_tick(&bench->controller, &bench->inputs, &bench->outputs);
-            if (run->gives_up) {
+            if (run->driver == RUN_GIVES_UP) {
                 give_up(bench, score);
+            } else if (run->driver == RUN_KNOWS) {
+                knowing_drive(&bench->knowing, &run->world, bench->world, bench->level_permille,
+                              bench->outputs.duty);
             }
         }
         score_tick(score, bench->world, powered ? &bench->controller : NULL);

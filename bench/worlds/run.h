@@ -21,6 +21,13 @@ typedef struct {
     uint16_t level_permille[WORLD_SPRINGS_MAX]; /* of one that is on; 0: fully */
 } run_command_t;
 
+/* Who drives. */
+typedef enum {
+    RUN_CONTROLLER = 0, /* as it is */
+    RUN_GIVES_UP,       /* a worse one, for tests: what must be heated again is switched off */
+    RUN_KNOWS           /* whoever knows all that is true (knowing.h): what physics leaves */
+} run_driver_t;
+
 typedef struct {
     world_parameters_t world;
     bool on[WORLD_SPRINGS_MAX]; /* asked for at the beginning */
@@ -31,8 +38,8 @@ typedef struct {
     uint8_t fan_percent;            /* the same of its fan: typed at power-on */
     double reset_s, reset_gap_s;    /* power goes off then, for so long; 0: never */
     double step_s, stepped_s; /* the surroundings change for good from then to then; 0: never */
-    bool gives_up; /* a worse controller, for tests: what must be heated again is switched off */
-    bool learnt;   /* the same array was driven before, and the board has kept what it learnt */
+    run_driver_t driver;
+    bool learnt; /* the same array was driven before, and the board has kept what it learnt */
 } run_case_t;
 
 typedef struct {

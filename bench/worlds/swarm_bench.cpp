@@ -87,7 +87,7 @@ void drive(const options_t &options, run_t &run, FILE *trace)
     const auto drawn = std::make_unique<swarm_case_t>();
     const auto result = std::make_unique<run_result_t>();
     swarm_draw(options.seed, run.index, options.seconds, drawn.get());
-    drawn->run.gives_up = options.gives_up;
+    drawn->run.driver = options.driver;
     run.group = drawn->group;
     run.diode = drawn->diode;
     run.drawn = drawn->drawn;
@@ -149,6 +149,7 @@ struct figure_t {
     const char *target_high;   // in all runs, of the interval's upper end; nullptr: none
     int digits;
     shares_run_t (*of)(const run_t &);
+    bool of_thoughts = true; // what a controller believes or says counts, not only what is true
     [[nodiscard]] bool is_share() const { return std::string(unit) == "%"; }
 };
 
@@ -189,14 +190,16 @@ const figure_t figures[] = {
     {"runs that hold: no spring lost, none above 120 degC", "%", "", nullptr, nullptr, 1,
      [](const run_t &r) {
          return shares_run_t{r.lost() == 0 && !r.hot() ? 1.0 : 0.0, 1.0};
-     }},
+     },
+     false},
     {"runs with any spring above 120 degC", "%", "<= 0.3", nullptr, "<= 0.6", 2,
      [](const run_t &r) {
          return shares_run_t{r.hot() ? 1.0 : 0.0, 1.0};
-     }},
+     },
+     false},
     {"driven springs below 90 % for more than 60 s on end, after 210 s", "%", "<= 0.5", nullptr,
      nullptr, 2,
-     [](const run_t &r) { return springs(r, [](const spring_t &s) { return s.lost(); }); }},
+     [](const run_t &r) { return springs(r, [](const spring_t &s) { return s.lost(); }); }, false},
     {"the same, and nothing said for so long", "%", "<= 0.05", nullptr, nullptr, 2,
      [](const run_t &r) { return springs(r, [](const spring_t &s) { return s.silent(); }); }},
     {"the same, and nothing said but `blind`", "%", "", nullptr, nullptr, 2,
@@ -213,7 +216,8 @@ const figure_t figures[] = {
          return sums(
              r, [](const spring_t &s) { return s.losses.there_s; },
              [](const spring_t &s) { return s.losses.judged_s; });
-     }},
+     },
+     false},
     {"of that, said to be away for nothing: not `blind` either", "%", "", nullptr, nullptr, 2,
      [](const run_t &r) {
          return sums(
@@ -226,7 +230,8 @@ const figure_t figures[] = {
          return sums(
              r, [](const spring_t &s) { return s.losses.back == LOSSES_BACK; },
              [](const spring_t &s) { return s.losses.back != LOSSES_NOT_JUDGED; });
-     }},
+     },
+     false},
     {"mean hold where the resistance tells the phase, alloy as declared", "degC", "<= 84", nullptr,
      nullptr, 1,
      [](const run_t &r) {
@@ -388,7 +393,7 @@ const char *verdict(const figure_t &figure, const std::vector<run_t> &runs)
     return !judged ? "" : met ? "met" : "**missed**";
 }
 
-std::string table(const std::vector<run_t> &runs)
+std::string table(const options_t &options, const std::vector<run_t> &runs)
 {
     std::string page = "| figure | target | |", rule = "|---|---|---|";
     for (const part_t &part : parts) {
@@ -402,6 +407,8 @@ std::string table(const std::vector<run_t> &runs)
     for (const part_t &part : parts)
         page += fmt::format(" {} |", springs_of(part, runs));
     for (const figure_t &figure : figures) {
+        if (options.driver == RUN_KNOWS && figure.of_thoughts)
+            continue;
         page += fmt::format("\n| {}, {} | {}{} | {} |", figure.name, figure.unit, figure.target,
                             figure.target_steady != nullptr
                                 ? fmt::format("; nothing steps {}", figure.target_steady)
@@ -412,6 +419,8 @@ std::string table(const std::vector<run_t> &runs)
         for (const part_t &part : parts)
             page += fmt::format(" {} |", cell(figure, measured(figure, part, runs)));
     }
+    if (options.driver == RUN_KNOWS)
+        return page + "\n";
     return page + "\n\n" + faults(runs) + "\n" + falsely_lying(runs) + "\n" + worst_tenth(runs) +
            "\n";
 }
@@ -463,6 +472,8 @@ json_t rows(const options_t &options, const std::vector<run_t> &runs)
     json_t list = json_t::array();
     for (const figure_t &figure : figures)
         for (const part_t &part : parts) {
+            if (options.driver == RUN_KNOWS && figure.of_thoughts)
+                continue;
             const shares_t x = measured(figure, part, runs);
             if (std::isnan(x.value))
                 continue;
@@ -475,8 +486,9 @@ json_t rows(const options_t &options, const std::vector<run_t> &runs)
             row["target"] = target(figure, part);
             row["command"] =
                 fmt::format("build/host/bench/worlds/bench_worlds --swarm {} --seed {} --first {} "
-                            "--seconds {:g}",
-                            options.runs, options.seed, options.first, options.seconds);
+                            "--seconds {:g}{}",
+                            options.runs, options.seed, options.first, options.seconds,
+                            options.driver == RUN_KNOWS ? " --knows" : "");
             list.push_back(row);
             if (figure.target_high != nullptr && part.has == parts[0].has) {
                 row["figure"] = fmt::format("{}: {}, upper end", part.name, figure.name);
@@ -631,7 +643,7 @@ void measure(const options_t &options)
 {
     const json_t before = options.against.empty() ? json_t() : read(options.against);
     const std::vector<run_t> runs = drive_all(options);
-    const std::string page = table(runs);
+    const std::string page = table(options, runs);
     double spent_s = 0.0;
     for (const run_t &run : runs)
         spent_s += run.wall_s;

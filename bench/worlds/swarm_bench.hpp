@@ -7,6 +7,10 @@
 #include <cstdint>
 #include <string>
 
+extern "C" {
+#include "run.h"
+}
+
 namespace swarm_bench
 {
 
@@ -15,7 +19,7 @@ struct options_t {
     std::uint64_t seed;
     double seconds;
     unsigned jobs;
-    bool gives_up;
+    run_driver_t driver;
     std::string json, markdown, keep, against;
 };
 

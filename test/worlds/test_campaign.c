@@ -572,7 +572,7 @@ TEST(a_draught_changes_the_whole_loss_by_what_is_said)
 }
 
 /* Springs lost in some runs. */
-static int lost_springs(bool gives_up, double *there_s)
+static int lost_springs(run_driver_t driver, double *there_s)
 {
     static swarm_case_t swarm;
     static run_result_t result;
@@ -580,7 +580,7 @@ static int lost_springs(bool gives_up, double *there_s)
     *there_s = 0.0;
     for (int i = 0; i < 6; i++) {
         swarm_draw(3, i, 420.0, &swarm);
-        swarm.run.gives_up = gives_up;
+        swarm.run.driver = driver;
         TEST_ASSERT_TRUE_MESSAGE(run_case(&swarm.run, &result, NULL), swarm.says);
         for (int k = 0; k < result.score.springs; k++) {
             lost += !isnan(result.losses.spring[k].lost_at_s);
@@ -593,11 +593,27 @@ static int lost_springs(bool gives_up, double *there_s)
 TEST(a_controller_that_never_heats_again_is_seen_and_a_run_is_the_same_twice)
 {
     double there_s, again_s, given_up_s;
-    const int lost = lost_springs(false, &there_s);
-    TEST_ASSERT_EQUAL_INT(lost, lost_springs(false, &again_s));
+    const int lost = lost_springs(RUN_CONTROLLER, &there_s);
+    TEST_ASSERT_EQUAL_INT(lost, lost_springs(RUN_CONTROLLER, &again_s));
     TEST_ASSERT_EQUAL_DOUBLE(there_s, again_s);
-    TEST_ASSERT_TRUE(lost_springs(true, &given_up_s) > lost + 2);
+    TEST_ASSERT_TRUE(lost_springs(RUN_GIVES_UP, &given_up_s) > lost + 2);
     TEST_ASSERT_TRUE(given_up_s < 0.9 * there_s);
+}
+
+/* What a run asks for physics allows: no spring need be lost in it, nor be above 120 degC. */
+TEST(whoever_knows_all_loses_no_spring)
+{
+    static swarm_case_t swarm;
+    static run_result_t result;
+    for (int i = 0; i < 12; i++) {
+        swarm_draw(3, i, 420.0, &swarm);
+        swarm.run.driver = RUN_KNOWS;
+        TEST_ASSERT_TRUE_MESSAGE(run_case(&swarm.run, &result, NULL), swarm.says);
+        for (int k = 0; k < result.score.springs; k++) {
+            TEST_ASSERT_TRUE_MESSAGE(isnan(result.losses.spring[k].lost_at_s), swarm.says);
+            TEST_ASSERT_TRUE_MESSAGE(result.score.spring[k].hottest_c <= 120.0, swarm.says);
+        }
+    }
 }
 
 /* Runs of the swarm, as drawn, in which springs were lost for more than a minute, in silence, or

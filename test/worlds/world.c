@@ -604,6 +604,11 @@ double world_spring_loss_factor(const world_t *world, int spring)
     return world->spring[spring].loss_factor;
 }
 
+double world_supply_v(const world_t *world)
+{
+    return world->supply_v;
+}
+
 double world_ambient_c(const world_t *world)
 {
     return world->ambient_c;

@@ -130,6 +130,7 @@ double world_voltage_v(const world_t *world, int spring);          /* the same, 
 double world_loss_factor(const world_t *world);                    /* by gust and fan */
 double world_spring_loss_factor(const world_t *world, int spring); /* by WORLD_LOSS_FACTOR alone */
 double world_ambient_c(const world_t *world);                      /* true, now */
+double world_supply_v(const world_t *world);                       /* the same */
 
 /* Where the heat is, J: what the wires hold above 0 degC of martensite, what currents have put in
  * since the start, and what went out to air, crimps and room. stored - supplied + lost stays. */
