@@ -12,7 +12,8 @@
 
 static double coldest_c(const world_t *world, int k)
 {
-    return fmin(world_node_c(world, k, 0), fmin(world_node_c(world, k, 1), world_node_c(world, k, 2)));
+    return fmin(world_node_c(world, k, 0),
+                fmin(world_node_c(world, k, 1), world_node_c(world, k, 2)));
 }
 
 /* Whether it needs current in the next tick. */

@@ -232,6 +232,50 @@ TEST(a_window_says_what_its_readings_were)
     }
 }
 
+/* A current that stands where it should be on average, beside a voltage that follows. */
+TEST(current_that_stands_at_its_mean_is_found)
+{
+    uint32_t tick = 0;
+    for (bool found = false; !found; tick++) {
+        TEST_ASSERT_LESS_THAN_UINT32(100, tick);
+        const uint16_t duty = swept(190, 16, tick);
+        circuit_check_take(&check, 180, 0, duty, true,
+                           (int16_t)lround(current_ma(&declared, 198, 0)),
+                           (int16_t)(4 * lround(current_ma(&declared, duty, 0) * 0.2 / 4.0)));
+        found = tick % CIRCUIT_CHECK_TICKS == 29u && judges(NULL);
+    }
+}
+
+/* Eleven readings are too few: of a window with a late tick nothing is judged then, and what is
+ * read next is another window's; of one without, it is judged as it is. */
+TEST(window_of_late_ticks_is_dropped)
+{
+    for (unsigned n = 0; n < 8; n++) {
+        const bool late = (n & 1u) != 0;
+        const uint8_t dead_steps = (n & 2u) != 0 ? 20 : 0;
+        const uint8_t readings = (n & 4u) != 0 ? 12 : 11;
+        setUp();
+        if (late) {
+            circuit_check_hurry(&check);
+        }
+        for (unsigned tick = 0; tick < 30; tick++) { /* the first one jumps, or is late */
+            circuit_check_take(&check, 180, dead_steps, 120, tick <= readings, 1000, 200);
+        }
+        const bool drops = late && readings < 12;
+        row(n);
+        TEST_ASSERT_EQUAL(drops, circuit_check_drop(&check));
+        if (drops) {
+            circuit_window_t window;
+            TEST_ASSERT_FALSE(circuit_check_drop(&check));
+            for (unsigned tick = 0; tick < 11; tick++) {
+                circuit_check_take(&check, 180, dead_steps, 120, true, 1000, 200);
+            }
+            TEST_ASSERT_FALSE(judges(&window));
+            TEST_ASSERT_FALSE(window.tells);
+        }
+    }
+}
+
 /* A window's readings: `share` of the sweep of so many steps shows, and the mean of all is as it
  * should be but for beyond_mv. From tick to tick it swings by swing_mv either way. What is read is
  * exact. */
