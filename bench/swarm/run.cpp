@@ -194,7 +194,8 @@ private:
         }
         pending_ = next;
         asked_s_ = now_s();
-        was_fed_ = board_is_fed(board_.raw());
+        /* a short of its pulses is none of the board's doing: by itself it is as fed as before */
+        was_fed_ = board_is_fed(board_.raw()) || unfed_s_ >= 0.0 || now_s() - shorted_s_ < UNFED_S;
         answer_.clear();
         if (next == "selftest") {
             tested_s_ = now_s();
@@ -502,6 +503,7 @@ private:
         case kind::enable_low:
         case kind::enable_high:
             unfed_s_ = e.on ? now_s() : -1.0;
+            shorted_s_ = now_s();
             break;
         default:
             break;
@@ -687,8 +689,8 @@ private:
     std::array<bool, SPRINGS> blind_{};
     bool welded_ = false, flipped_ = false, reset_is_due_ = false, hanging_ = false;
     bool stopped_ = false;
-    double stop_s_ = 0.0, hang_s_ = 0.0, flip_s_ = -1.0, unfed_s_ = -1.0, forgotten_s_ = 0.0,
-           fed_s_ = 0.0;
+    double stop_s_ = 0.0, hang_s_ = 0.0, flip_s_ = -1.0, unfed_s_ = -1.0, shorted_s_ = -1.0,
+           forgotten_s_ = 0.0, fed_s_ = 0.0;
 };
 
 } // namespace

@@ -331,6 +331,11 @@ TEST(hottest_possible_cools_by_the_least_loss_with_its_latent_heat)
         power_comes_on();
         row(n);
         TEST_ASSERT_EQUAL_FLOAT(SPRING_ESTIMATOR_HOTTEST_C, INSIDE.hottest_c);
+        const spring_bounds_t any = spring_estimator_austenite(&estimator, &model, 0);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, any.low);
+        TEST_ASSERT_EQUAL_FLOAT(1.0f, any.high);
+        /* it lacks no contact: none is declared, whatever it reads */
+        TEST_ASSERT_FALSE(spring_estimator_lacks_contact(&estimator, &model, 0));
         NEAR(pow(0.29 * ((double)SPRING_ESTIMATOR_HOTTEST_C - 20.0) + 5.0, 2) + 9.0,
              INSIDE.variance_k2);
         INSIDE.hottest_c = (float)c;
