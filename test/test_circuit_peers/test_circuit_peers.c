@@ -328,6 +328,71 @@ TEST(beside_others_at_about_its_volts_a_share_is_learnt)
     }
 }
 
+/* An eighth less is within an eighth. */
+TEST(volts_an_eighth_apart_are_about_the_same)
+{
+    static const float table[][2] = {{896.0f, 1024.0f}, {1024.0f, 896.0f}};
+    for (unsigned n = 0; n < ROWS(table); n++) {
+        setUp();
+        source.unsure_mv = 600.0f;
+        for (uint8_t k = SPRINGS; k-- > 0;) {
+            TEST_ASSERT_FALSE(takes(k, table[n][k == 0 ? 0 : 1], 1.0f));
+        }
+        TEST_ASSERT_EQUAL_UINT8(1, peers.spring[0].learnt);
+    }
+}
+
+/* 0.18 of 1140 mV, less 25, are 180: not more where the others show more than all. What only the
+ * drop explains is learnt of who was not found. */
+TEST(what_a_drop_leaves_of_a_share_teaches)
+{
+    static const struct {
+        float unsure_mv, more_mv, share;
+        uint8_t learnt;
+    } table[] = {{175.0f, 0.0f, 1.5f, 1}, {200.0f, 0.0f, 1.5f, 0}, {0.0f, 900.0f, 1.15f, 1}};
+    for (unsigned n = 0; n < ROWS(table); n++) {
+        setUp();
+        source.unsure_mv = table[n].unsure_mv;
+        source.more_mv = table[n].more_mv;
+        for (uint8_t k = SPRINGS; k-- > 0;) {
+            TEST_ASSERT_FALSE(
+                takes(k, k == 0 ? HEATS_MV : 1500.0f, k == 0 ? table[n].share : 1.5f));
+        }
+        TEST_ASSERT_EQUAL_UINT8(table[n].learnt, peers.spring[0].learnt);
+    }
+}
+
+/* A drop of which little is known may make any share of it: that is kept to 13 bits. */
+TEST(a_share_of_its_own_is_twice_the_others_at_the_most)
+{
+    source.more_mv = 1e5f;
+    for (uint8_t k = SPRINGS; k-- > 0;) {
+        TEST_ASSERT_FALSE(takes(k, k == 0 ? 1500.0f : HEATS_MV, k == 0 ? 3.0f : 1.0f));
+    }
+    TEST_ASSERT_EQUAL_UINT16(8191, peers.spring[0].own_q12);
+}
+
+/* Of the supply it is what it showed beside the others, times its own: neither less than anything,
+ * which would be that nothing is known, nor more than eight bits hold. */
+TEST(what_it_showed_before_is_kept_within_a_byte)
+{
+    static const struct {
+        uint8_t share_q7;
+        uint16_t own_q12;
+        uint8_t was_q7;
+    } table[] = {{1, 100, 1}, {255, 8191, 255}, {100, 2048, 50}, {100, 0, 100}};
+    for (unsigned n = 0; n < ROWS(table); n++) {
+        setUp();
+        peers.spring[0] = (circuit_peer_t){.own_q12 = table[n].own_q12 & 0x1FFFu,
+                                           .agreed = 1,
+                                           .share_q7 = table[n].share_q7,
+                                           .shown_16mv = 71,
+                                           .was_q7 = table[n].was_q7};
+        TEST_ASSERT_FALSE(takes(0, HEATS_MV, (float)table[n].was_q7 / 128.0f));
+        TEST_ASSERT_EQUAL_UINT8(table[n].was_q7, peers.spring[0].was_q7);
+    }
+}
+
 /* A diode of 0.38 V that nobody declared, as currents rise: at a fifteenth more duty, half as much
  * again comes through. No share is learnt of that, and by the drop that is found all are alike. */
 TEST(what_comes_through_an_unknown_drop_is_no_share)
@@ -579,6 +644,7 @@ TEST(who_shows_its_own_share_again_is_acquitted)
     TEST_ASSERT_EQUAL_HEX(1, rounds(3, SPRINGS, 600.0f, 0.8f, 1.0f));
     circuit_peers_clear(&peers, 0, true);
     TEST_ASSERT_EQUAL_HEX(0, rounds(1, SPRINGS, HOLDS_MV, 0.96f, 1.0f));
+    TEST_ASSERT_EQUAL_UINT8(20, peers.spring[0].learnt); /* 19 before */
     TEST_ASSERT_EQUAL_HEX(0, rounds(2, SPRINGS, 600.0f, 0.8f, 1.0f));
     TEST_ASSERT_EQUAL_HEX(1, rounds(1, SPRINGS, 600.0f, 0.8f, 1.0f));
 }
