@@ -402,6 +402,11 @@ bool board_raise_interrupt(board_t *board, unsigned vector)
     return false;
 }
 
+uint8_t board_register(const board_t *board, unsigned address)
+{
+    return board->avr->data[address];
+}
+
 void board_flip(board_t *board, unsigned address, uint8_t bits)
 {
     avr_t *avr = board->avr;

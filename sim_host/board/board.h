@@ -164,6 +164,8 @@ uint16_t board_sensor_register(const board_t *board, unsigned channel, unsigned 
 /* A bit or more of a register (0x20..0x1FF, as the program sees it) or of RAM (0x200..0x21FF) turns
  * over by itself. */
 void board_flip(board_t *board, unsigned address, uint8_t bits);
+/* What it holds now; address as above. */
+uint8_t board_register(const board_t *board, unsigned address);
 /* An interrupt that nothing asked for: its enable bit is set and it is raised. False if and only if
  * the simulated chip has no such vector (its number by the data sheet, less one: the program's). */
 bool board_raise_interrupt(board_t *board, unsigned vector);

@@ -175,6 +175,29 @@ TEST(stops_whatever_bit_of_an_output_has_turned_over)
     }
 }
 
+/* A part that has lost its clock, or a serial port that is set otherwise: nothing else may notice.
+ */
+TEST(what_keeps_the_board_going_is_written_anew_within_a_tick)
+{
+    constexpr unsigned PRR0 = 0x64, PRR1 = 0x65, UCSR0B = 0xC1, UCSR0C = 0xC2, UBRR0L = 0xC4;
+    constexpr bit REGISTERS[] = {
+        {PRR0, 0xEF}, {PRR1, 0x3F}, {UCSR0B, 0xDC}, {UCSR0C, 0xFF}, {UBRR0L, 0xFF}};
+    rig mega;
+    mega.boot();
+    for (const bit &one : REGISTERS) {
+        const std::uint8_t was = board_register(mega.raw(), one.address);
+        for (unsigned mask = 1; mask < 256; mask *= 2) {
+            if ((mask & one.mask) != 0) {
+                turn_over(mega, {one.address, static_cast<std::uint8_t>(mask)});
+                TEST_ASSERT_TRUE(was != board_register(mega.raw(), one.address));
+                mega.run_ms(TICK_MS);
+                TEST_ASSERT_EQUAL_HEX8(was, board_register(mega.raw(), one.address));
+            }
+        }
+    }
+    mega.expect_ok("on all 30");
+}
+
 TEST(off_is_off_again_within_a_tick_whatever_bit_turns_over)
 {
     rig mega;
