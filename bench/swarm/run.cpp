@@ -234,6 +234,9 @@ private:
         if (asked[0] == '$' && equals != std::string::npos) {
             const std::string name = lower(asked.substr(1, equals - 1));
             unsure_.erase(name);
+            if (ok && audit_) { /* a stop has dropped the answer that tells what the reset kept */
+                typed_since_.insert(name);
+            }
             if (ok) {
                 settings_.erase(name);
                 waiting_.push_front("$" + name); /* as it prints it */
@@ -322,6 +325,7 @@ private:
             saved_.push_back(now);
         }
         audit_ = false;
+        typed_since_.clear();
         at_reset_saving_.reset();
         unsure_.clear();
         settings_ = now;
@@ -343,8 +347,8 @@ private:
     {
         for (const auto &[name, value] : now) {
             const auto found = then.find(name);
-            if (!loose(name) && unsure_.count(name) == 0 && found != then.end() &&
-                found->second != value) {
+            if (!loose(name) && unsure_.count(name) + typed_since_.count(name) == 0 &&
+                found != then.end() && found->second != value) {
                 return name + " was " + found->second + ", is " + value;
             }
         }
@@ -373,6 +377,7 @@ private:
         waiting_.push_back("");
         waiting_.push_back("$$");
         audit_ = true;
+        typed_since_.clear();
         unsure_.clear();
         wish_.fill(false);
         stopped_ = false;
@@ -681,7 +686,7 @@ private:
     values defaults_, settings_;
     std::vector<values> saved_;
     std::optional<values> saving_, at_reset_saving_;
-    std::set<std::string> unsure_;
+    std::set<std::string> unsure_, typed_since_; /* a reset */
     bool audit_ = false, torn_ = false, eeprom_worn_ = false;
     /* faults */
     std::array<double, SPRINGS> closed_s_ = {-1, -1, -1, -1, -1, -1, -1, -1, -1};
