@@ -234,10 +234,10 @@ private:
         if (asked[0] == '$' && equals != std::string::npos) {
             const std::string name = lower(asked.substr(1, equals - 1));
             unsure_.erase(name);
-            if (ok && audit_) { /* a stop has dropped the answer that tells what the reset kept */
-                typed_since_.insert(name);
-            }
             if (ok) {
+                if (audit_) { /* a stop has dropped the answer that tells what the reset kept */
+                    typed_since_.insert(name);
+                }
                 settings_.erase(name);
                 waiting_.push_front("$" + name); /* as it prints it */
             }
@@ -686,7 +686,7 @@ private:
     values defaults_, settings_;
     std::vector<values> saved_;
     std::optional<values> saving_, at_reset_saving_;
-    std::set<std::string> unsure_, typed_since_; /* a reset */
+    std::set<std::string> unsure_, typed_since_; /* since a reset that is not audited yet */
     bool audit_ = false, torn_ = false, eeprom_worn_ = false;
     /* faults */
     std::array<double, SPRINGS> closed_s_ = {-1, -1, -1, -1, -1, -1, -1, -1, -1};

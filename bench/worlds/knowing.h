@@ -1,6 +1,6 @@
-/* What it is for: a driver that knows all that is true: what it cannot do, physics forbids, and so
- * no controller can. What it owns: which springs heat. What it never does: read a sensor, or
- * believe anything. */
+/* What it is for: a driver that knows all that is true: what it cannot do, no controller can.
+ * What it owns: which springs heat.
+ * What it never does: read a sensor, or believe anything. */
 #ifndef WORLDS_KNOWING_H
 #define WORLDS_KNOWING_H
 
