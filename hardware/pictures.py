@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import Any
 
 import schemdraw
 import schemdraw.elements as elm
@@ -19,7 +20,7 @@ schemdraw.use("svg")
 OUT = HERE.parent / "docs" / "hardware"
 NO_BREAK = "\u00a0"
 """A blank that a browser does not make one of many of."""
-STYLE = {"fontsize": 11, "bgcolor": "white", "margin": 0.4}
+STYLE: dict[str, Any] = {"fontsize": 11, "bgcolor": "white", "margin": 0.4}
 
 
 def value(ohm: float) -> str:

@@ -15,6 +15,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -82,7 +83,9 @@ comes from the run that wrote it, on a simulated array; its logs lie beside it.<
 </html>
 """
 
-ink = dict.fromkeys(("text.color", "axes.edgecolor", "axes.labelcolor", "xtick.color", "ytick.color"), INK)
+ink: dict[Any, Any] = dict.fromkeys(
+    ("text.color", "axes.edgecolor", "axes.labelcolor", "xtick.color", "ytick.color"), INK
+)
 plt.rcParams.update(
     {"font.size": 10, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False, "svg.hashsalt": "ninespring"} | ink
 )

@@ -77,9 +77,7 @@ def declared() -> Model:
 def baseline(runs: list[Run], given: Model, error: Callable[[Model], float]) -> float:
     """Return the error of the better of two models fitted to runs: the given one, and that with a lag."""
     array = Array(1, boards.HEATERS)
-    fits = [
-        diagnosis.fit_effects(array, runs, wanted, declared=given.parameters)[:2] for wanted in ([], ["sensor_lag"])
-    ]
+    fits = [diagnosis.fit_effects(array, runs, wanted, model=given)[:2] for wanted in ([], ["sensor_lag"])]
     return min(error(model_of(problem, fit, runs)) for problem, fit in fits)
 
 

@@ -49,7 +49,7 @@ class Kept:
     ) -> list[dict[str, Any]]:
         """Do what is not done of (call, argument) by key, each told as it ends but for its entry `unsaid`; return all cases."""
         with concurrent.futures.ProcessPoolExecutor(processes) as pool:
-            todo = {pool.submit(*job): key for key, job in wanted.items() if key not in self.cases}
+            todo = {pool.submit(call, of): key for key, (call, of) in wanted.items() if key not in self.cases}
             for future in concurrent.futures.as_completed(todo):
                 one = future.result()
                 self.add(todo[future], one)

@@ -307,8 +307,8 @@ def figures(done: list[dict[str, Any]]) -> list[dict[str, Any]]:
         out.append(
             percent("another world: the known effect named", [o["known"] in o["names"] for o in beside], ">= 90")
         )
-        seen = [o["known"] in o["names"] for o in beside if o["shown"] >= MATTERS]
-        out.append(percent("the same, where by the truth it leaves half the noise", seen, ""))
+        named = [o["known"] in o["names"] for o in beside if o["shown"] >= MATTERS]
+        out.append(percent("the same, where by the truth it leaves half the noise", named, ""))
         out.append(percent("another world: flagged (`unexplained`)", [o["unexplained"] for o in others], ">= 95"))
         told = [o["unexplained"] or o["told"] for o in others]
         out.append(percent("another world: flagged, or the cause told in a warning", told, ""))

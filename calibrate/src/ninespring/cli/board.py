@@ -85,7 +85,7 @@ def record(
                 got = record_board(board, log, hz, duration, steps, tell, about(port), logger, alarm, err.print)
         if not log.rows:
             raise WorkError(got.ended or "stopped before the first row came")
-        result = results.Record(rows=log.rows, dropped_lines=got.dropped, ended=got.ended, faults=got.faults)
+        result = results.Record(rows=log.rows, dropped_lines=got.dropped, ended=got.ended, faults=[*got.faults])
         write({json_path: results.checked(result)})
         lines = f", {got.dropped} corrupt lines dropped" if got.dropped else ""
         if got.offset_s is not None:

@@ -21,7 +21,7 @@ from .console import ARRAY, FOLDER, JSON, command, make_folder, number, out, out
 
 FROM = {"duration": 900.0, "drive_for": 300.0, "current": 2.0, "supply": 14.0, "hottest": 105.0}
 """What is taken where nothing is said."""
-UNKNOWN = ("--speed", "max", "--set", "plant.effects=latent_heat,resistance_phase,edge_loss")
+UNKNOWN: tuple[str, ...] = ("--speed", "max", "--set", "plant.effects=latent_heat,resistance_phase,edge_loss")
 UNKNOWN += ("--set", "plant.edge_loss_fraction=0.25")
 """The simulated board's array does what its chip has not been told: its edge loses more heat."""
 REPORT, ARRAY_FILE = "report.html", "array.toml"
@@ -104,7 +104,7 @@ def calibrate(
         return yes or click.confirm(text, default=False)
 
     try:
-        declared = {"array.rows": array.rows, "array.cols": array.cols}
+        declared: dict[str, float] = {"array.rows": array.rows, "array.cols": array.cols}
         declared |= {f"plant.{name}": value for name, value in array_parameters(array).items()}
         words = [word for name, value in declared.items() for word in ("--set", f"{name}={value}")]
         with Board(port or SIMULATED, simulated=(*UNKNOWN, *words)) as board:

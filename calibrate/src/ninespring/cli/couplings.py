@@ -9,6 +9,7 @@ import click
 from rich.table import Table
 
 from ..errors import InputError, WorkError
+from ..explore.couplings import Found
 from ..explore.couplings import couplings as find
 from ..explore.geometry import geometry_of
 from ..io import results
@@ -41,7 +42,7 @@ Examples:
 @click.option("--mesh", type=click.Choice(MESHES), default="normal", help="size of the elements")
 @output("model.toml to write; - prints it")
 @JSON
-def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None) -> None:
+def couplings(array_path: Path, mesh: results.Elements, output: Path, json_path: Path | None) -> None:
     """Reckon loss and couplings of an array from its geometry: a field solution, reduced to the model's numbers.
 
     What cools it stands in [cooling] of array.toml. Nothing measured goes in: docs/exploring.md says how far that carries.
@@ -91,7 +92,7 @@ def _found(full: str) -> str:
     return f"stiffness_{name}" if of_one else name
 
 
-def _parameters(found: object) -> dict[str, results.Coupling]:
+def _parameters(found: Found) -> dict[str, results.Coupling]:
     return {
         name: results.Coupling(
             value=value,

@@ -59,20 +59,21 @@ def diagnose(
     if frozen and not model_path:
         raise InputError("--frozen needs --model")
     model, array = model_and_array(model_path, array_path)
+    told: results.SteadyDiagnosis | results.BoardDiagnosis | results.Diagnosis
     if any(steady.is_steady(path) for path in logs):
         if len(logs) > 1:
             raise InputError("give one steady table, or logs")
         with working("fitting") as say:
-            told, made = steady.diagnose_table(logs[0], model, array or Array(), frozen, say)
-        page = report.steady_report(told)
+            still, made = steady.diagnose_table(logs[0], model, array or Array(), frozen, say)
+        told, page = still, report.steady_report(still)
     else:
         array, runs = array_and_runs(array, logs)
         if from_resistance.has_none(runs):
             if model_path:
                 raise InputError("without a thermometer give logs and an array only, no --model", logs[0])
             with working("fitting v / i") as say:
-                told, made = board_alone.diagnose(array, runs, say)
-            page = report.board_report(told, str(output))
+                alone, made = board_alone.diagnose(array, runs, say)
+            told, page = alone, report.board_report(alone, str(output))
         else:
             with working("fitting") as say:
                 found = diagnosis.diagnose(array, runs, model=model, frozen=frozen, progress=say)

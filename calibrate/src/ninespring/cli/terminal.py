@@ -14,7 +14,7 @@ import click
 from prompt_toolkit import PromptSession
 from prompt_toolkit.completion import CompleteEvent, Completer, Completion
 from prompt_toolkit.document import Document
-from prompt_toolkit.history import FileHistory, InMemoryHistory
+from prompt_toolkit.history import FileHistory, History, InMemoryHistory
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.patch_stdout import patch_stdout
 
@@ -93,9 +93,9 @@ class Known(Completer):
             return
         before, _, last = text.rpartition(" ")
         if not before:
-            for one in self.words.values():
-                if one.name.startswith(last):
-                    yield Completion(one.name, -len(last), one.usage, one.sentence)
+            for word in self.words.values():
+                if word.name.startswith(last):
+                    yield Completion(word.name, -len(last), word.usage, word.sentence)
         elif word := self.words.get(before.split()[0]):
             for choice in word.choices(len(before.split()) - 1, self.springs):
                 if choice.startswith(last):
@@ -175,7 +175,8 @@ def talk_at_a_terminal(board: Board) -> None:
     """Let a user type until Ctrl-D, with history, completion and help."""
     known = Known(words_of(board.ask("help", LONGEST_S)), board.settings())
     talk = Talk(board, print)
-    keys, history = KeyBindings(), InMemoryHistory()
+    keys = KeyBindings()
+    history: History = InMemoryHistory()
     with suppress(OSError):
         home().mkdir(parents=True, exist_ok=True)
         history = FileHistory(str(home() / "console-history"))

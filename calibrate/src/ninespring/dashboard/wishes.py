@@ -38,7 +38,7 @@ WISHES: dict[str, dict[str, Any]] = {
     "all": {"level": Level},
     "pattern": {"springs": Pattern},
     "play": {
-        "patterns": Annotated[list[Pattern], Meta(min_length=1, max_length=100, description="1 to 100 patterns")],
+        "patterns": Annotated[list[Pattern], Meta(min_length=1, max_length=100, description="1 to 100 patterns")],  # type: ignore[valid-type]
         "seconds": _number(0.5, 3600, "s"),
     },
     "policy": {"policy": Annotated[Literal["open", "precompensate"], Meta(description="open or precompensate")]},

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.sparse.linalg import splu
@@ -100,7 +101,7 @@ def two_rods(mesh: Mesh, joint_diameter_mm: float = 2.0) -> tuple[float, float]:
     """
     around = Cooling(plate="none", margin_mm=2.0)
     spring = spring_of(Array(), around)
-    joint = {"joint": "steel", "gap_mm": 0.002, "joint_diameter_mm": joint_diameter_mm}
+    joint: dict[str, Any] = {"joint": "steel", "gap_mm": 0.002, "joint_diameter_mm": joint_diameter_mm}
     below = Below(spring, joint["gap_mm"], MATERIALS[joint["joint"]], joint_diameter_mm)
     geometry = Geometry(1, 1, 5.0, spring, around, below=below)
     mesh = replace(mesh, along=mesh.corners // 4)  # a spring is nine times as long as what the joint cools of it

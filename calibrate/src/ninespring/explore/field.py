@@ -161,12 +161,12 @@ def _layers(geometry: Geometry, films: list[Film], mesh: Mesh) -> tuple[list[Lay
         crimp = Region(made.conductivity, share * made.conductivity, share * made.heat_per_m3k)
         stack = []
         for layer in (1, 0):  # from below
-            one = geometry.springs[layer]
-            ring = coils[layer] if one.radius_mm == geometry.radii_mm[-1] else airs[layer]
+            spring = geometry.springs[layer]
+            ring = coils[layer] if spring.radius_mm == geometry.radii_mm[-1] else airs[layer]
             for graded in (1, -1):
                 stack.append(
                     Layer(
-                        one.length_mm * MM / 2.0,
+                        spring.length_mm * MM / 2.0,
                         mesh.along,
                         airs[layer],
                         solid or airs[layer],
@@ -302,7 +302,8 @@ def _section(geometry: Geometry, mesh: Mesh) -> _Section:
     )
     at = plan.p[:, plan.t].mean(axis=1)  # (2, triangles)
     owner = np.hypot(at[0, :, None] - centres[:, 0], at[1, :, None] - centres[:, 1]).argmin(axis=1)
-    inside, core = (within(*(at - centres[owner].T), one, mesh.corners) for one in (radius, inner))
+    east, north = at - centres[owner].T
+    inside, core = (within(east, north, one, mesh.corners) for one in (radius, inner))
     wall = np.zeros(at.shape[1], dtype=bool)
     for left, low, right, high in walls:
         wall |= (at[0] > left) & (at[0] < right) & (at[1] > low) & (at[1] < high)
@@ -384,10 +385,10 @@ def build(geometry: Geometry, fan: bool, mesh: Mesh, film: Film | None = None) -
         stiff = stiff + faces
     stiff, capacity = times * sparse.csc_matrix(stiff), times * sparse.csc_matrix(capacity)
     lanes, flows = [], []
-    for layer, one in enumerate(geometry.springs):
+    for floor, one in enumerate(geometry.springs):
         heat = by.air_heat_per_m3k(geometry.ambient_c)
         for lane in lanes_of(geometry.rows, geometry.cols, cooling.fan_direction):
-            lanes.append([layer * n + j for j in lane])
+            lanes.append([floor * n + j for j in lane])
             flows.append(heat * cooling.fan_m_per_s * pitch * one.length_mm * MM)
     return Field(
         stiff,

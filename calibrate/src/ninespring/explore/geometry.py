@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -206,7 +207,7 @@ def ring_radius_mm(wire_mm: float, coil_mm: float, spacing_mm: float, elements: 
     basis = Basis(mesh, ElementTriP2())
 
     @BilinearForm
-    def conduct(u: object, v: object, w: object) -> object:
+    def conduct(u: Any, v: Any, w: Any) -> Any:
         return w.x[0] * dot(grad(u), grad(v))
 
     matrix = conduct.assemble(basis)

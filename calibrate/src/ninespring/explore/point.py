@@ -43,7 +43,7 @@ def plant_of_point(spec: Spec, point: Mapping[str, Any]) -> native.Plant:
         native.paper_configure(plant, array.pitch_mm or 5.0)
         plant.set_all(array_parameters(array))
     else:
-        described = {"rows": array.rows, "cols": array.cols, "pitch_mm": array.pitch_mm}
+        described: dict[str, Any] = {"rows": array.rows, "cols": array.cols, "pitch_mm": array.pitch_mm}
         described |= {"spring": array.spring, "material": array.material, "cooling": array.cooling}
         described |= {"stiffness": array.stiffness}
         plant.set_all(array_parameters(array))
@@ -112,14 +112,14 @@ def run_point(spec: Spec, index: int, point: Mapping[str, Any]) -> dict[str, Any
         return out | dict.fromkeys(METRICS, math.nan) | {"error": str(error)}
 
 
-def metrics_of(spec: Spec, point: dict[str, Any], seed: int) -> dict[str, float]:
+def metrics_of(spec: Spec, point: Mapping[str, Any], seed: int) -> dict[str, float]:
     """Run a point by its seed; return its metrics (UNITS in spec.py)."""
     rng = np.random.default_rng(seed)
     declared = plant_of_point(spec, point)
     array = array_of_point(point)
     board = board_of_point(point, array)
     lines = [
-        native.chip_export(declared, part)[0] + settings_of(point | spec.boards.get(number, {}))
+        native.chip_export(declared, part)[0] + settings_of({**point, **spec.boards.get(number, {})})
         for number, part in enumerate(native.boards_of(array.rows, array.cols, *board, array.layers), 1)
     ]
     real = real_of(declared, point, rng)

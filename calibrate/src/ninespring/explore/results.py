@@ -21,7 +21,7 @@ from .spec import Spec
 try:
     import fcntl
 except ImportError:  # Windows: two sweeps into one folder are not told apart there
-    fcntl = None  # type: ignore[assignment]
+    fcntl = None
 
 META = b"ninespring"
 

@@ -37,7 +37,7 @@ class Measure:
     """One array says nothing of it: worse is what is so on every one."""
 
 
-WORSE = {
+WORSE: dict[results.Measure, Measure] = {
     "held": Measure(
         0.03, "springs that are on hold {old:.0%} austenite as the chip is now, {new:.0%} with the new settings"
     ),
@@ -101,7 +101,7 @@ def drive(plant: native.Plant, lines: str, pattern: np.ndarray) -> Drive:
     )
 
 
-def worse_than(old: Drive, new: Drive) -> list[str]:
+def worse_than(old: Drive, new: Drive) -> list[results.Measure]:
     """Return the measures in which one drive is worse than another.
 
     A spring that is heated further takes longer and gets hotter: that is no fault of settings that hold more of it, and heating

@@ -295,7 +295,7 @@ def _windows(
         """Return the cause of such columns."""
         columns = np.zeros((sum(samples), len(edges)), dtype=np.float32)
         columns[begin : begin + samples[r]] = block
-        profiles = [None] * len(problem.runs)
+        profiles: list[np.ndarray | None] = [None] * len(problem.runs)
         profiles[r] = profile
         return Cause(kind, f"{text}, {{}} of run {r + 1}", tuple(profiles), columns, ends)
 

@@ -117,10 +117,10 @@ def _among(
         steps, model = grown, trial
     while steps:
         without = [fitted([other for other in steps if other is not one]) for one in steps]
-        nats = [nats_of(read, less, model) for less in without]
+        each = [nats_of(read, less, model) for less in without]
         sizes = [abs(float(value)) for value in model.values[len(columns) :]]
-        n = min(range(len(steps)), key=lambda k: nats[k] if sizes[k] >= SMALLEST_OHM else -math.inf)
-        if nats[n] >= math.log(tried) + LEAST_NATS and sizes[n] >= SMALLEST_OHM:
+        n = min(range(len(steps)), key=lambda k: each[k] if sizes[k] >= SMALLEST_OHM else -math.inf)
+        if each[n] >= math.log(tried) + LEAST_NATS and sizes[n] >= SMALLEST_OHM:
             break
         steps = _placed([other for m, other in enumerate(steps) if m != n], best)
         model = fitted(steps)

@@ -24,7 +24,8 @@ LASTS = 0.1
 
 def search_lasting(problem: Problem, first: Search, final: Fit) -> tuple[Search, Found]:
     """Search on from what was found, errors that last taken for that; the problem weighs readings so when this returns."""
-    found, result = first, (final, {}, [])
+    found = first
+    result: Found = final, {}, []
     for _ in range(TIMES):
         begin, names = result[0], result[0].spec.variant
         likelihood(problem, begin)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 
 from ..infer.fit import Fit
@@ -57,7 +59,7 @@ def entry(problem: Problem, fit: Fit, effect: str, nats: float, sure: Witness) -
             parameters[fit.spec.free[k].key].stderr = float(fit.values[k] * np.sqrt(max(0.0, variance)))
     probability = max(NAMED, sure.probability())  # where less, what was not seen tells of it
     return results.RunsDiffer(
-        name=effect,
+        name=cast(results.OwnOfRuns, effect),
         evidence=nats,
         probability=probability,
         certainty="certain" if probability >= CERTAIN else "probable",

@@ -103,18 +103,19 @@ class Search:
         vector = vector - q @ (q.T @ vector)
         moment, size = directions.T @ vector, np.maximum((directions**2).sum(axis=0), 1e-12)
         owners = np.array(owner, dtype=int)
-        keep, probe = np.ones(len(owners), dtype=bool), {}
+        keep = np.ones(len(owners), dtype=bool)
+        places: dict[int, list[int]] = {}
         for k, candidate in enumerate(open_):
             if candidate.alternatives:
                 columns = np.flatnonzero(owners == k)
                 right = candidate.signed | (moment[columns] > 0)
                 promise = np.where(right, moment[columns] ** 2 / size[columns], 0.0)
-                probe[k] = [int(j) for j in np.argsort(-promise)[:PLACES]]
+                places[k] = [int(j) for j in np.argsort(-promise)[:PLACES]]
                 keep[columns] = False
-                keep[columns[probe[k][0]]] = True
+                keep[columns[places[k][0]]] = True
         self.directions, moment = directions[:, keep], moment[keep]
         gram = self.directions.T @ self.directions
-        screen = Screen(fit, open_, owners[keep], gram, moment, probe)
+        screen = Screen(fit, open_, owners[keep], gram, moment, places)
         self.screens[key] = screen
         return screen
 
@@ -154,7 +155,7 @@ class Search:
         starts = [start]
         for candidate in added:
             others = [candidate.start_at(1.0, place) for place in self.places(fit, candidate)[1:]]
-            starts += [start | other for other in (*candidate.more_starts, *others)]
+            starts += [{**start, **other} for other in (*candidate.more_starts, *others)]
         # several starts race: all begin, the one that is ahead goes on
         race = len(starts) > 1
         steps = SPRINT if race else STEPS
@@ -165,7 +166,7 @@ class Search:
         if race:
             best = self.problem.fit(spec, best.as_dict(), tolerance=1e-3, max_steps=STEPS, near=best)
         for mirror in (one.mirror for one in added if one.mirror):
-            start = best.as_dict() | mirror(best.as_dict(), self.problem.base_value)
+            start = {**best.as_dict(), **mirror(best.as_dict(), self.problem.base_value)}
             other = self.problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS)
             best = min(best, other, key=lambda one: one.chi2)
         if best.chi2 > fit.chi2:  # it lost on the way what it began with: with next to nothing added it has all of it
@@ -287,7 +288,7 @@ class Search:
         if not pairs:
             return out
         best_single = min((f.chi2 for f, _ in out), default=fit.chi2)
-        top = {}
+        top: dict[str, list[int]] = {}
         for k in range(count):
             top.setdefault(screen.candidates[k].effect, []).append(k)
         keep = [k for ks in top.values() for k in sorted(ks, key=lambda k: -alone[k][0])[: 3 if len(ks) > 4 else 2]]

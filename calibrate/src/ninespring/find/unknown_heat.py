@@ -61,7 +61,14 @@ class UnknownHeat:
 
 
 def event(
-    r: int, kind: str, k: int, span_s: tuple[float, float], size: float, error: float, nats: float, usual_w: np.ndarray
+    r: int,
+    kind: results.Unknown,
+    k: int,
+    span_s: tuple[float, float],
+    size: float,
+    error: float,
+    nats: float,
+    usual_w: np.ndarray,
 ) -> results.Event:
     """Return one piece: heat (W, at spring k from 0), common (at all springs alike, k = -1) or sensor (a reading that jumps, K)."""
     usual = float(usual_w[k]) if k >= 0 else float(np.nanmean(usual_w))
@@ -128,7 +135,8 @@ def _events_of(
     if len(edges) < 4:
         return []
     answers = step_answers(problem, fit, r, edges, typical_w)
-    kinds = [("heat", k) for k in range(springs)] + [("sensor", k) for k in range(springs)]
+    kinds: list[tuple[results.Unknown, int]] = [("heat", k) for k in range(springs)]
+    kinds += [("sensor", k) for k in range(springs)]
     if springs > 1:
         kinds.append(("common", -1))
 
@@ -150,7 +158,7 @@ def _events_of(
     left = left - basis @ (basis.T @ left)
     steps = {one: columns_of(*one) for one in kinds}
     grams = {one: windows.products(block, basis) for one, block in steps.items()}
-    chosen: list[tuple[str, int, int, int]] = []
+    chosen: list[tuple[results.Unknown, int, int, int]] = []
     columns: list[np.ndarray] = []
     shortest = max(1, round(SHORTEST_S / (grid * step)))
     tried = len(kinds) * len(edges) ** 2 / 2
@@ -178,7 +186,7 @@ def _events_of(
     out = []
     since = [float(run.time_s[row] - run.time_s[0]) for row in (*edges, -1)]
     shown = problem.without_errors(fit.residual)[r]
-    sensors = [(k, a, b, size) for (kind, k, a, b), size in zip(chosen, sizes, strict=True) if kind == "sensor"]
+    sensors = [(k, a, b, float(size)) for (kind, k, a, b), size in zip(chosen, sizes, strict=True) if kind == "sensor"]
     for (kind, k, a, b), size, error, nats in zip(chosen, sizes, errors, gains, strict=True):
         span_s = (since[a], since[b])
         small = abs(size) < (SMALLEST * typical_w if kind != "sensor" else 3.0 * float(noise[k]))

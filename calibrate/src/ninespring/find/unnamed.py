@@ -178,7 +178,8 @@ def find(
     named = np.array([one.kind == NAMED for one in single])
     whole = (matrix**2).sum(axis=0)
     power = whole - ((basis.T @ matrix) ** 2).sum(axis=0)
-    grams, often_grams = [windows_of.products(one.columns, basis) for one in windows], []
+    grams = [windows_of.products(one.columns, basis) for one in windows]
+    often_grams: list[np.ndarray] = []
     powers = [windows_of.powers((one.columns.T @ one.columns).astype(float)) for one in windows]
     tried = len(single) + sum(one.columns.shape[1] ** 2 / 2 for one in windows)
     while len(found) < most:
@@ -187,7 +188,8 @@ def find(
         gain = np.where(possible, moment**2 / np.maximum(power, 1e-12), 0.0)
         names = float(gain[named].max(initial=0.0))
         k = int(np.argmax(np.where(named, 0.0, gain)))
-        drop, vector, best, span = float(gain[k]), matrix[:, k], single[k], (0, None)
+        span: tuple[int, int | None] = (0, None)
+        drop, vector, best = float(gain[k]), matrix[:, k], single[k]
         for one, gram, of_all in zip(windows, grams, powers, strict=True):
             if _within(one, found):
                 continue
@@ -244,7 +246,8 @@ def _heat(problem: Problem, hidden: Sequence[Hidden]) -> list[np.ndarray] | None
     for one in given:
         if one.cause.bumps:
             for size, (r, *about) in zip(one.inside, one.cause.bumps, strict=True):
-                out[r] += size * bump(*about, len(out[r])) * one.cause.profiles[r]
+                first, top, last = about
+                out[r] += size * bump(first, top, last, len(out[r])) * one.cause.profiles[r]
             continue
         (size,), (begin, end) = one.inside, one.rows
         for heat, profile in zip(out, one.cause.profiles, strict=True):
@@ -479,7 +482,7 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
         # the same cause as it is by the numbers that it had spoilt
         hidden = [replace(one, cause=next(k for k in kinds if k.text == one.cause.text)) for one in hidden]
     out = names = None
-    left_out = None, None
+    left_out: tuple[np.ndarray | None, list[np.ndarray] | None] = None, None
     longest = 0
     for _ in range(ROUNDS):
         if out is not None and not problem.budget.allows(longest):
@@ -496,8 +499,8 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
             break
         problem.leave_out(np.column_stack([one.column for one in grown]), problem.heat)
         # what they add depends on the numbers, which they spoilt until now
-        nearer = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
-        grown = taken_out(problem, nearer, grown)
+        settled = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
+        grown = taken_out(problem, settled, grown)
         search, taken = _beside(problem, first, grown), (problem.unnamed, problem.heat)
         # what only helps together was looked for before: beside a cause without a name, what shows alone is enough
         result = search.run(downwards=False)

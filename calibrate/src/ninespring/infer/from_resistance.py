@@ -20,7 +20,7 @@ from ..io.logs.run import Run
 from ..model import native
 from ..model.models import Array, Model
 from ..model.simulate import simulate_run
-from ..model.spec import Free, Spec
+from ..model.spec import Free, Spec, Values
 from .declared import base_spec
 from .fit import Fit
 from .problem import _BAD, Problem
@@ -95,7 +95,7 @@ class Resistances(Problem):
     def simulate(
         self,
         spec: Spec,
-        values: Sequence[float],
+        values: Values,
         run_index: int,
         start_offset: np.ndarray | None = None,
         power_w: np.ndarray | None = None,

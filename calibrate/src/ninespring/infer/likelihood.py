@@ -112,7 +112,7 @@ class Rows:
         step[list(starts)] = BROKEN
         seen = np.flatnonzero(mask.any(axis=0))
         some = mask[:, seen]
-        all_there = some.all(axis=1)
+        all_there = np.asarray(some.all(axis=1))
         turn = None
         if len(seen) > 1 and all_there.sum() >= FULL * some.any(axis=1).sum():
             turn = np.linalg.qr(np.column_stack([np.ones(len(seen)), np.eye(len(seen))[:, 1:]]))[0].T

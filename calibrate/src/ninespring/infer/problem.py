@@ -23,7 +23,7 @@ from ..io.logs.run import Run
 from ..model import native
 from ..model.models import Array
 from ..model.simulate import array_parameters, fades_per_s, hidden_k, simulate_run
-from ..model.spec import AMBIENT_OFFSET, DRIVE_GAIN, RUN_DRIVE, SENSOR_OFFSET, Spec
+from ..model.spec import AMBIENT_OFFSET, DRIVE_GAIN, RUN_DRIVE, SENSOR_OFFSET, Spec, Values
 from .budget import Budget
 from .descent import Descent, Shown
 from .fit import Fit
@@ -190,7 +190,7 @@ class Problem:
                 ambient = ambient + hats[run_index] @ np.asarray(drift)
         return ambient
 
-    def plant_for(self, spec: Spec, values: Sequence[float], run_index: int | None = None) -> native.Plant:
+    def plant_for(self, spec: Spec, values: Values, run_index: int | None = None) -> native.Plant:
         """Return a fresh plant with the spec's effects and values, commands as strong as in a run where one is given."""
         plant = self._base.copy()
         plant.set_effects(spec.plant_effects)
@@ -221,7 +221,7 @@ class Problem:
     def simulate(
         self,
         spec: Spec,
-        values: Sequence[float],
+        values: Values,
         run_index: int,
         start_offset: np.ndarray | None = None,
         power_w: np.ndarray | None = None,
@@ -239,7 +239,7 @@ class Problem:
         except native.NativeError:
             return np.full(run.temperature_c.shape, _BAD)
 
-    def simulate_many(self, jobs: Sequence[tuple[Spec, Sequence[float], int]]) -> list[np.ndarray]:
+    def simulate_many(self, jobs: Sequence[tuple[Spec, Values, int]]) -> list[np.ndarray]:
         """Simulate (spec, values, run) jobs in parallel threads."""
         return self.each(lambda job: self.simulate(*job), jobs)
 
@@ -249,7 +249,7 @@ class Problem:
             return [make(job) for job in jobs]
         return list(self._pool.map(make, jobs))
 
-    def predictions(self, spec: Spec, values: Sequence[float]) -> list[np.ndarray]:
+    def predictions(self, spec: Spec, values: Values) -> list[np.ndarray]:
         """Return what all runs should show."""
         return self.simulate_many([(spec, values, r) for r in range(len(self.runs))])
 
@@ -342,7 +342,7 @@ class Problem:
         """Return the sum of squared residuals in units of the noise."""
         return sum(float((part**2).sum()) for part in self.scaled(residual))
 
-    def learn_starts(self, spec: Spec, values: Sequence[float]) -> None:
+    def learn_starts(self, spec: Spec, values: Values) -> None:
         """Find how an error of each starting temperature dies out, to keep it out of all that follows.
 
         A simulation starts at the first measured temperatures, which carry the sensor's noise and hide what a spring was about.
@@ -380,7 +380,7 @@ class Problem:
                 u, size, _ = np.linalg.svd(white, full_matrices=False)
                 self.basis[r] = u * np.sqrt(1.0 - 1.0 / np.sqrt(1.0 + size**2))
 
-    def learn_power(self, spec: Spec, values: Sequence[float]) -> None:
+    def learn_power(self, spec: Spec, values: Values) -> None:
         """Find what rounding of the board's voltages leaves in each run: to keep it out of what is judged."""
         for r, run in enumerate(self.runs):
             if errors := power_errors(run):
@@ -438,7 +438,7 @@ class Problem:
     ) -> np.ndarray:
         """Return d(residual vector)/d(inner coordinate) by one-sided differences, simulated in parallel."""
         columns = range(len(spec.free)) if columns is None else columns
-        jobs: list[tuple[Spec, Sequence[float], int]] = []
+        jobs: list[tuple[Spec, Values, int]] = []
         where: list[tuple[int, int, float]] = []
         for c in columns:
             free = spec.free[c]
@@ -481,8 +481,8 @@ class Problem:
         values = np.array([(start or {}).get(f.key, f.start) for f in free], dtype=float)
         values = np.array([min(f.high, max(f.low, v)) for f, v in zip(free, values, strict=True)], dtype=float)
         if not free:
-            nothing = np.zeros((self.count, 0)), None, np.zeros((0, 0))
-            return self.evaluate(Fit(spec, values, math.nan, self.count, [], *nothing))
+            slopes, covariance = np.zeros((self.count, 0)), np.zeros((0, 0))
+            return self.evaluate(Fit(spec, values, math.nan, self.count, [], slopes, covariance=covariance))
 
         def show(numbers: np.ndarray) -> Shown:
             shown = self.predictions(spec, numbers)
@@ -543,7 +543,7 @@ class Problem:
         def numbers(out: np.ndarray | None = None) -> np.ndarray:
             rows = both if out is None else np.where(out[:, None], 0.0, both)
             rows = rows if self.colour is not None else self._whitened(rows)
-            return np.linalg.qr(np.vstack([rows, believed]), mode="r")
+            return np.asarray(np.linalg.qr(np.vstack([rows, believed]), mode="r"))
 
         whole = numbers()[: len(z), :-1]
         back = np.linalg.pinv(whole)

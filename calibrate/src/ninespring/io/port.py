@@ -13,12 +13,13 @@ from pathlib import Path
 
 import serial
 
+from ..errors import InputError, WorkError
+
+terminal_error: type[Exception]
 try:
     from termios import error as terminal_error
 except ImportError:  # Windows
     terminal_error = OSError
-
-from ..errors import InputError, WorkError
 
 BAUD = 115200
 LONGEST_LINE = 8192
@@ -87,7 +88,7 @@ class Port:
 
     def close(self) -> None:
         """Close the port, whatever became of it."""
-        with suppress(GONE):
+        with suppress(*GONE):
             self._serial.close()
 
 

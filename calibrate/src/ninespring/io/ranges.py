@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import numbers
 from dataclasses import dataclass
+from typing import Any
 
 from ..errors import InputError
 
@@ -19,7 +20,7 @@ class Range:
     above: bool = False
     whole: bool = False
 
-    def check(self, name: str, value: object) -> float:
+    def check(self, name: str, value: Any) -> float:
         """Return the number; InputError with `name` where it is none, not finite, or outside."""
         real = isinstance(value, numbers.Real) and not isinstance(value, bool)
         good = real and math.isfinite(value) and (self.low < value if self.above else self.low <= value)

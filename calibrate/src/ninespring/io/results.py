@@ -7,13 +7,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import msgspec
 import numpy as np
 from msgspec import UNSET, Meta, UnsetType
 
 from .. import __version__
+
+if TYPE_CHECKING:
+    Absent = Any  # who reads it knows that it is there
+else:
+    Absent = UnsetType
 
 TOOL = f"ninespring {__version__}"
 
@@ -31,6 +36,10 @@ Name = Annotated[
     ),
 ]
 Certainty = Literal["certain", "probable"]
+OwnOfRuns = Literal["run_drive_gain", "run_ambient_offset", "run_sensor_offset"]
+Unknown = Literal["heat", "common", "sensor"]
+Elements = Literal["coarse", "normal", "fine"]
+Measure = Literal["held", "heating_s", "hottest_c", "undriven"]
 
 
 class Part(msgspec.Struct, forbid_unknown_fields=True):
@@ -43,10 +52,8 @@ class Number(Part):
     value: float
     stderr: Size | None
     unit: str
-    note: str | UnsetType = UNSET
-    interval_95: Annotated[tuple[float, float], Meta(description="where it lies in 95 of 100 cases")] | UnsetType = (
-        UNSET
-    )
+    note: str | Absent = UNSET
+    interval_95: Annotated[tuple[float, float], Meta(description="where it lies in 95 of 100 cases")] | Absent = UNSET
 
 
 Parameters = dict[str, Number]
@@ -102,7 +109,7 @@ class Named(Part):
     """An effect, which may be one of several kinds: both have a `name` and a `variant`."""
 
     @property
-    def called(self) -> str:
+    def called(self: Any) -> str:
         """Its name, and which of its kinds it is."""
         return f"{self.name} ({self.variant})" if self.variant else self.name
 
@@ -117,13 +124,13 @@ class Effect(Named):
     parameters: Parameters
     on_chip: bool
     in_words: str
-    probability: Share | UnsetType = UNSET
-    certainty: Certainty | UnsetType = UNSET
-    witness: Witness | UnsetType = UNSET
-    text: str | UnsetType = UNSET
-    variant: str | UnsetType = UNSET
-    why_not_on_chip: Reason | UnsetType = UNSET
-    seen_by: Literal["v / i"] | UnsetType = UNSET
+    probability: Share | Absent = UNSET
+    certainty: Certainty | Absent = UNSET
+    witness: Witness | Absent = UNSET
+    text: str | Absent = UNSET
+    variant: str | Absent = UNSET
+    why_not_on_chip: Reason | Absent = UNSET
+    seen_by: Literal["v / i"] | Absent = UNSET
 
 
 class Step(Part):
@@ -156,11 +163,11 @@ class Rival(Named):
     evidence: Annotated[float, Meta(description="by which the named one leads, nats")]
     parameters: Parameters
     separating_experiment: Reason
-    variant: str | UnsetType = UNSET
-    holdout_rmse_c: Size | UnsetType = UNSET
-    predictions_differ_c: float | UnsetType = UNSET
-    experiment: Experiment | UnsetType = UNSET
-    against: str | UnsetType = UNSET
+    variant: str | Absent = UNSET
+    holdout_rmse_c: Size | Absent = UNSET
+    predictions_differ_c: float | Absent = UNSET
+    experiment: Experiment | Absent = UNSET
+    against: str | Absent = UNSET
 
 
 class Spread(Part):
@@ -173,7 +180,7 @@ class Spread(Part):
 class RunsDiffer(Part):
     """What is a run's own, not the array's: random effects with the spread of the runs."""
 
-    name: Literal["run_drive_gain", "run_ambient_offset", "run_sensor_offset"]
+    name: OwnOfRuns
     evidence: float
     probability: Share
     certainty: Certainty
@@ -207,7 +214,7 @@ class Event(Part):
     """Heat of unknown origin, or a thermometer that jumped."""
 
     run: Spring
-    kind: Literal["heat", "common", "sensor"]
+    kind: Unknown
     spring: Spring | None
     from_s: float
     to_s: float
@@ -243,9 +250,9 @@ class Residual(Part):
     autocorrelation_lag1: Annotated[float, Meta(ge=-1.0, le=1.0)]
     depends_on: list[str]
     note: str
-    structure_c: Size | UnsetType = UNSET
-    rmse_per_spring_c: list[float | None] | UnsetType = UNSET
-    noise_per_spring_c: list[float | None] | UnsetType = UNSET
+    structure_c: Size | Absent = UNSET
+    rmse_per_spring_c: list[float | None] | Absent = UNSET
+    noise_per_spring_c: list[float | None] | Absent = UNSET
 
 
 class Identifiability(Part):
@@ -262,10 +269,10 @@ class Baseline(Part):
     rmse_c: Size | None
     holdout_rmse_c: Size | None
     noise_c: Size | None
-    parameters: Parameters | UnsetType = UNSET
-    effects: list[Name] | UnsetType = UNSET
-    rmse_v: Size | UnsetType = UNSET
-    noise_v: Size | UnsetType = UNSET
+    parameters: Parameters | Absent = UNSET
+    effects: list[Name] | Absent = UNSET
+    rmse_v: Size | Absent = UNSET
+    noise_v: Size | Absent = UNSET
 
 
 class After(Part):
@@ -273,8 +280,8 @@ class After(Part):
 
     rmse_c: Size | None
     holdout_rmse_c: Size | None
-    parameters: Parameters | UnsetType = UNSET
-    rmse_v: Size | UnsetType = UNSET
+    parameters: Parameters | Absent = UNSET
+    rmse_v: Size | Absent = UNSET
 
 
 class Candidate(Part):
@@ -307,7 +314,7 @@ class Case(Part):
     case: str
     measured_c: float
     before_c: float
-    after_c: float | UnsetType = UNSET
+    after_c: float | Absent = UNSET
 
 
 class Told(Part, kw_only=True, tag_field="schema", tag="ninespring.diagnosis/1"):
@@ -335,8 +342,8 @@ class Diagnosis(Told, tag="ninespring.diagnosis/1"):
     doubts: Annotated[list[str], Meta(description="those of the warnings for which export refuses the model")]
     seconds: Size
     simulations: Count
-    unseen: Unseen | UnsetType = UNSET
-    resistance: Resistance | UnsetType = UNSET
+    unseen: Unseen | Absent = UNSET
+    resistance: Resistance | Absent = UNSET
 
 
 class BoardDiagnosis(Told, tag="ninespring.diagnosis/1"):
@@ -382,9 +389,9 @@ class Fit(Result, tag="ninespring.fit/1"):
     not_identifiable: list[str]
     at_bounds: list[str]
     warnings: list[str]
-    rmse_before_v: Size | UnsetType = UNSET
-    rmse_v: Size | UnsetType = UNSET
-    noise_v: Size | UnsetType = UNSET
+    rmse_before_v: Size | Absent = UNSET
+    rmse_v: Size | Absent = UNSET
+    noise_v: Size | Absent = UNSET
 
 
 class Predict(Result, tag="ninespring.predict/1"):
@@ -396,7 +403,7 @@ class Predict(Result, tag="ninespring.predict/1"):
     rows: Count
     rmse_c: Size | None
     rmse_per_spring_c: list[Size | None]
-    note: str | UnsetType = UNSET
+    note: str | Absent = UNSET
 
 
 class Replayed(Part):
@@ -427,7 +434,7 @@ class Drive(Part):
     """A measure of a drive with the old and the new settings, on one of the arrays that were tried."""
 
     array: Spring
-    measure: Literal["held", "heating_s", "hottest_c", "undriven"]
+    measure: Measure
     old: float
     new: float
 
@@ -492,7 +499,7 @@ class Upload(Result, tag="ninespring.upload/1"):
 
     settings: Annotated[int, Meta(ge=1)]
     saved: bool
-    undone: str | UnsetType = UNSET
+    undone: str | Absent = UNSET
 
 
 class Coupling(Part):
@@ -507,7 +514,7 @@ class Coupling(Part):
 class Couplings(Result, tag="ninespring.couplings/1"):
     """`ninespring couplings`."""
 
-    mesh: Literal["coarse", "normal", "fine"]
+    mesh: Elements
     unknowns: Annotated[int, Meta(ge=1)]
     cylinder_diameter_mm: float
     drive_error: float
@@ -525,8 +532,8 @@ class Sweep(Result, tag="ninespring.sweep/1"):
     points: Count
     done_before: Count
     failed: Count
-    best: dict[str, Any] | UnsetType = UNSET
-    indices: dict[str, Any] | UnsetType = UNSET
+    best: dict[str, Any] | Absent = UNSET
+    indices: dict[str, Any] | Absent = UNSET
 
 
 class Done(msgspec.Struct):

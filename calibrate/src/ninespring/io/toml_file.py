@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import functools
-import operator
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
@@ -80,7 +79,10 @@ class TomlFile:
 
         Refused where it is otherwise; `called` is its name in a refusal.
         """
-        return self._read(kind, at, functools.reduce(operator.getitem, at, self.data), called)
+        value: Any = self.data
+        for key in at:
+            value = value[key]
+        return self._read(kind, at, value, called)
 
     def _read(self, kind: Any, at: At, value: Any, called: str = "") -> Any:
         tables = [str(one) for one in at if isinstance(one, str)]

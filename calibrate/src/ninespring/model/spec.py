@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 RUN_DRIVE, RUN_AMBIENT, RUN_SENSOR = RUNS_OWN = ("run_drive_gain", "run_ambient_offset", "run_sensor_offset")
 """What may be a run's own (effects/runs_differ.py): of the measurement, unknown to the plant."""
 DRIVE_GAIN, AMBIENT_OFFSET, SENSOR_OFFSET = "drive_gain", "ambient_offset_k", "run_sensor_offset_k"
 """Their numbers, by run: `drive_gain@1`."""
+Values = Sequence[float] | np.ndarray
+"""Values of a spec's free numbers, in their order and units."""
 
 
 @dataclass(frozen=True)

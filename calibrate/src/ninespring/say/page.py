@@ -38,7 +38,7 @@ def render(template: str, **said: Any) -> str:
 def number_rows(parameters: results.Parameters) -> list[tuple[str, ...]]:
     """Return numbers with standard errors, units, and what they are, as rows of text."""
     table = native.parameter_table()
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name, one in parameters.items():
         error = "not determined" if one.stderr is None else f"{one.stderr:.2g}"
         known = table.get(re.split(r"[\[@]", name)[0])
@@ -195,7 +195,7 @@ def board_report(told: results.BoardDiagnosis, folder: str = "diagnosis") -> str
 
 def candidate_rows(told: results.SteadyDiagnosis) -> list[tuple[str, ...]]:
     """Return the effects that were tried on a steady table as rows of text, under HEADER."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for one in told.candidates:
         unit = "" if one.unit in (None, "1") else f" {one.unit}"
         value = "" if one.value is None else f"{one.parameter} = {one.value:.4g}{unit}"

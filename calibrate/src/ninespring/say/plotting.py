@@ -134,11 +134,11 @@ def animation_of(run: Run, rows: int, cols: int) -> bytes:
     """Return an animation (GIF) of the array's temperatures; the file says who wrote it, as matplotlib does in all other kinds."""
     pick = np.unique(np.linspace(0, len(run.time_s) - 1, min(FRAMES, len(run.time_s))).astype(int))
     drawing, draw = _map(run, rows, cols)
-    frames = []
+    canvas, frames = FigureCanvasAgg(drawing), []
     for row in pick:
         draw(row)
-        drawing.canvas.draw()
-        frames.append(Image.fromarray(np.array(drawing.canvas.buffer_rgba())).convert("RGB"))
+        canvas.draw()
+        frames.append(Image.fromarray(np.array(canvas.buffer_rgba())).convert("RGB"))
     out = io.BytesIO()
     more = {"append_images": frames[1:], "duration": FRAME_MS, "loop": 0, "comment": "Matplotlib, ninespring"}
     frames[0].save(out, "GIF", save_all=True, **more)

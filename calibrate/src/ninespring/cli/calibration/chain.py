@@ -37,7 +37,7 @@ from .progress import Progress
 RUNS = ("run1", "run2")
 DIAGNOSIS = "diagnosis"
 SETTINGS, OLD_SETTINGS = "settings.txt", "settings-before.txt"
-OWN = ("policy", "open_current_a", "host_timeout_s", "telemetry_format", "telemetry_hz")
+OWN: tuple[str, ...] = ("policy", "open_current_a", "host_timeout_s", "telemetry_format", "telemetry_hz")
 OWN += tuple(f"resistance_{one}_ohm" for one in ("maximum", "minimum", "martensite", "austenite"))
 """Settings that recording changes, and that are given back."""
 COOLED_K, COOLED_S = 2.0, 60.0

@@ -10,7 +10,8 @@ import numpy as np
 
 from .branch import hotter_before
 
-DriveMode = Literal["power", "current", "command"]
+DriveMode = Literal["power", "current", "command", "temperature"]
+"""`temperature`: of no log, but as a simulation is driven that only follows it."""
 SENSORS = ("camera", "thermocouple", "thermistor", "resistance", "semiconductor")
 """What measures temperatures: the first sees more than one spring, the others touch each its own."""
 
