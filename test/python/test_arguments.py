@@ -37,6 +37,17 @@ def test_every_number_of_every_command_is_refused_beyond_its_range() -> None:
         assert np.isfinite([low, high]).all()
 
 
+def test_an_option_that_is_required_is_asked_for() -> None:
+    asked = 0
+    for name in COMMANDS:
+        command = cli.get_command(click.Context(cli), name)
+        for option in (one for one in command.params if one.required):
+            asked += 1
+            with pytest.raises(click.MissingParameter):
+                option.handle_parse_result(click.Context(command, info_name=name), {}, [])
+    assert asked >= 20
+
+
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), -1.0, 1e308, "900", None, True])
 def test_a_function_refuses_what_its_option_refuses(bad: object) -> None:
     with pytest.raises(ns.InputError, match="duration_s = "):

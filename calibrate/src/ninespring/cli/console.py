@@ -122,7 +122,9 @@ def number(name: str, within: Range, says: str, default: float | None = None) ->
 
 def output(says: str, kind: click.Path = FILE, default: Path | None = None) -> Decorator:
     """Return the option that names what is written: a file, or a folder."""
-    return click.option("-o", "--output", type=kind, required=default is None, default=default, help=says)
+    # a default of None is one that was given, to click 8.3 and later: then nothing is required
+    given = {"required": True} if default is None else {"default": default}
+    return click.option("-o", "--output", type=kind, help=says, **given)
 
 
 @contextmanager
