@@ -88,7 +88,7 @@ def test_an_upload_says_which_springs_are_warm_or_waits_until_none_is(fake: Fake
     [
         ({"learnt clear": ["error:12 a spring is on"]}, "a spring is on"),
         ({"$loss_w_per_k=9": ["error:4 out of range"]}, "s.txt:3:3: '$loss_w_per_k=9' refused: error 4 out of range"),
-        ({"$loss_w_per_k=9": ["[not active yet: x]", "ok"]}, "x]: nothing is saved, a reset of the board gives back"),
+        ({"$loss_w_per_k=9": ["[not active yet: x]", "ok"]}, "x]: nothing is saved, the board has what it had"),
         ({"$$": ["$loss_w_per_k=0.005800", "ok"]}, "loss_w_per_k is 0.005800, not 9"),
         ({"$$": ["ok"]}, "loss_w_per_k is missing"),
     ],
@@ -101,6 +101,22 @@ def test_what_the_board_does_not_take_is_said_and_nothing_saved(
     code, told = ninespring("upload", "--port", board.port, tmp_path / "s.txt")
     assert (code, said in told) == (1, True), told
     assert "$save" not in board.seen
+
+
+def test_a_refused_upload_gives_back_what_it_sent_before(fake: FakeBoard, tmp_path: Path) -> None:
+    fake.answers["$hold_margin_k=300"] = ["error:4 out of range"]
+    (tmp_path / "s.txt").write_text("$loss_w_per_k=0.009100\n$hold_margin_k=300\n")
+    code, said = ninespring("upload", "--port", fake.port, tmp_path / "s.txt")
+    assert (code, "error 4 out of range: nothing is saved, the board has what it had" in said) == (1, True), said
+    assert fake.settings == HAD and "$save" not in fake.sent()
+
+
+def test_a_board_that_does_not_take_it_back_needs_a_reset(fake: FakeBoard, tmp_path: Path) -> None:
+    fake.answers["$hold_margin_k=300"] = ["error:4 out of range"]
+    fake.answers[f"$loss_w_per_k={HAD['loss_w_per_k']}"] = ["error:12 a spring is on"]
+    (tmp_path / "s.txt").write_text("$loss_w_per_k=0.009100\n$hold_margin_k=300\n")
+    code, said = ninespring("upload", "--port", fake.port, tmp_path / "s.txt")
+    assert (code, "out of range: nothing is saved, a reset of the board gives back" in said) == (1, True), said
 
 
 def test_what_the_board_has_otherwise_than_sent_is_not_taken_back(fake: FakeBoard, tmp_path: Path) -> None:

@@ -9,10 +9,10 @@ import subprocess
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -422,7 +422,7 @@ class Board:
         with contextlib.closing(self.stream(50)) as rows:
             return next(rows)
 
-    def stream(self, hz: int = 5, seconds: float = math.inf) -> Iterator[Reading]:
+    def stream(self, hz: int = 5, seconds: float = math.inf) -> Generator[Reading, None, None]:
         """Yield what the board measures, `hz` rows a second, for so many seconds of its own; ends telemetry with the loop.
 
         Bounds and phase are asked for once a second. In the loop the board may be driven and asked as ever.
@@ -500,8 +500,9 @@ def reading(cells: Mapping[str, str], believed: Mapping[int, Belief] | None = No
     springs, believed = range(1, 1 + springs_in(cells)), believed or {}
     each = {name: [float(cells.get(column.format(k), "nan")) for k in springs] for name, column in EACH.items()}
     each |= {name: [getattr(believed.get(k), name, math.nan) for k in springs] for name in BELIEVED}
-    of_all = {name: float(cells[name]) for name in ("time_s", "fan", "ambient_c")}
-    return Reading(**of_all, state=cells["state"], **{name: np.array(values) for name, values in each.items()})
+    told: dict[str, Any] = {name: np.array(values) for name, values in each.items()}
+    told |= {name: float(cells[name]) for name in ("time_s", "fan", "ambient_c")}
+    return Reading(state=cells["state"], **told)
 
 
 UNSAVED = "nothing is saved, a reset of the board gives back what it had"
@@ -515,8 +516,32 @@ def send_settings(
 ) -> None:
     """Send settings, read them back, save them; what the board has learnt beside its old numbers it forgets.
 
-    WorkError, and nothing is saved, where the board refuses one or shows another value.
+    WorkError, and the board has what it had, where it refuses one or shows another value.
     """
+    before = board.settings()
+    try:
+        _send(board, settings, say)
+    except WorkError as error:
+        raise WorkError(f"{error}: {_taken_back(board, settings, before)}") from None
+    if save:
+        board.ask("$save", 10.0)
+
+
+def _taken_back(board: Board, sent: Mapping[str, str], before: Mapping[str, str]) -> str:
+    """Give a board back what it had before settings that it does not take; return what is to be said of that."""
+    had = {name: before[name] for name in reversed(sent) if name in before}
+    try:
+        has = board.settings()
+        for name, value in had.items():
+            if has.get(name) != value:
+                board.ask(f"${name}={value}")
+        return UNSAVED if settings_that_differ(had, board.settings()) else "nothing is saved, the board has what it had"
+    except WorkError:
+        return UNSAVED
+
+
+def _send(board: Board, settings: Mapping[str, str], say: Callable[[str, int], None]) -> None:
+    """Send settings and read them back; WorkError where the board refuses one or shows another value."""
     remarks = board.ask("learnt clear", 10.0)
     for k, (name, value) in enumerate(settings.items()):
         line = f"${name}={value}"
@@ -525,14 +550,12 @@ def send_settings(
             remarks = board.ask(line)
         except WorkError as error:
             where = settings.places[name] if isinstance(settings, Settings) else ""
-            raise WorkError(f"{where}{error}: {UNSAVED}") from None
+            raise WorkError(f"{where}{error}") from None
     if remarks:
-        raise WorkError(f"the board does not take them together: {remarks[-1]}: {UNSAVED}")
+        raise WorkError(f"the board does not take them together: {remarks[-1]}")
     say("reading back", len(settings))
     if wrong := settings_that_differ(settings, board.settings()):
-        raise WorkError(f"the board shows other values than were sent: {'; '.join(wrong)}: {UNSAVED}")
-    if save:
-        board.ask("$save", 10.0)
+        raise WorkError(f"the board shows other values than were sent: {'; '.join(wrong)}")
 
 
 def settings_that_differ(sent: Mapping[str, str], has: Mapping[str, str]) -> list[str]:
