@@ -40,6 +40,10 @@ struct loop {
     double supply_v;
     double source_ohm;
     double freewheel_drop_v;
+    struct {
+        size_t supply_v, source_ohm, freewheel_drop_v, loop_ohm; /* of the plant's parameters */
+    } at;
+    bool sags;
     double highest_sum_a;
     electrics_cut_off_t cut_off;
     channel_t channel[CONTROLLER_MAX_SPRINGS];
@@ -62,11 +66,21 @@ static bool options_are_good(const loop_options_t *options)
            fabs(options->ambient_error_c) <= 100.0;
 }
 
-static double parameter(const plant_t *plant, const char *name, int spring)
+static double parameter(const plant_t *plant, size_t index, int spring)
 {
     double value = 0.0;
-    (void)plant_get_index(plant, (size_t)plant_parameter_index(name), spring, &value);
+    (void)plant_get_index(plant, index, spring, &value);
     return value;
+}
+
+static void find_circuit(loop_t *loop)
+{
+    const int sag = plant_effect_index("supply_sag");
+    loop->sags = sag >= 0 && plant_effect_is_on(loop->plant, (size_t)sag);
+    loop->at.supply_v = (size_t)plant_parameter_index("supply_v");
+    loop->at.source_ohm = (size_t)plant_parameter_index("supply_resistance_ohm");
+    loop->at.freewheel_drop_v = (size_t)plant_parameter_index("freewheel_drop_v");
+    loop->at.loop_ohm = (size_t)plant_parameter_index("loop_resistance_ohm");
 }
 
 static int16_t to_c7(double temperature_c)
@@ -85,7 +99,11 @@ void loop_read_plant(loop_t *loop)
 {
     for (int k = 0; k < loop->springs; k++) {
         loop->channel[k].terminal_ohm = plant_terminal_ohm(loop->plant, loop->place[k]);
+        loop->channel[k].loop_ohm = parameter(loop->plant, loop->at.loop_ohm, loop->place[k]);
     }
+    loop->supply_v = parameter(loop->plant, loop->at.supply_v, -1);
+    loop->source_ohm = loop->sags ? parameter(loop->plant, loop->at.source_ohm, -1) : 0.0;
+    loop->freewheel_drop_v = parameter(loop->plant, loop->at.freewheel_drop_v, -1);
     loop->ambient_c = plant_ambient_c(loop->plant);
 }
 
@@ -127,17 +145,11 @@ loop_t *loop_create_part(const controller_settings_t *settings, plant_t *plant, 
             goto fail;
         }
     }
-    loop->supply_v = parameter(plant, "supply_v", -1);
-    loop->freewheel_drop_v = parameter(plant, "freewheel_drop_v", -1);
-    int sag = plant_effect_index("supply_sag");
-    if (sag >= 0 && plant_effect_is_on(plant, (size_t)sag)) {
-        loop->source_ohm = parameter(plant, "supply_resistance_ohm", -1);
-    }
+    find_circuit(loop);
     for (int k = 0; k < loop->springs; k++) {
         loop->place[k] = (first_row + k / settings->model.columns) * plant_columns(plant) +
                          first_column + k % settings->model.columns;
         loop->channel[k].stage = k;
-        loop->channel[k].loop_ohm = parameter(plant, "loop_resistance_ohm", loop->place[k]);
         (void)plant_drive(plant, loop->place[k], PLANT_DRIVE_POWER, 0.0);
     }
     (void)plant_set_fan(loop->plant, 0.0);

@@ -93,8 +93,8 @@ bool loop_tell_ambient(loop_t *loop, double ambient_c);
 /* Of the plant, and (with ambient_error_c) what the chip is told. Fails if the plant refuses it. */
 bool loop_set_ambient(loop_t *loop, double ambient_c);
 
-/* Owned by the loop. Drives, fan and ambient of the plant are set by the loop; supply and stages
- * are taken from its parameters when the loop is created; the rest may be changed. */
+/* Owned by the loop. Drives, fan and ambient of the plant are set by the loop; all else may be
+ * changed, but for its effects, and counts from the plant's next step on. */
 controller_t *loop_controller(loop_t *loop);
 plant_t *loop_plant(loop_t *loop);
 
