@@ -184,7 +184,8 @@ void add_bench_options(CLI::App &command, bench_arguments &arguments)
     command
         .add_option("--wiring", arguments.wiring,
                     std::string("What is wired wrongly, or not yet: ") + WORDS +
-                        "; @FILE: the words that this file has, looked at again as it changes")
+                        "; --wiring again for another; @FILE: the words that this file has, looked "
+                        "at again as it changes")
         ->take_all()
         ->allow_extra_args(false);
 }

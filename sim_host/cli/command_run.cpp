@@ -456,7 +456,8 @@ void add_command_run(CLI::App &app)
         ->check(CLI::IsMember({"open", "precompensate"}));
     command
         ->add_option("--set", options->sets,
-                     "key=value as if the scenario said so: a plant parameter, or section.key")
+                     "key=value as if the scenario said so: a plant parameter, or section.key; "
+                     "again for another")
         ->take_all()
         ->allow_extra_args(false);
     command->add_option("--seed", options->seed, "Overrides the scenario's seed");

@@ -104,7 +104,8 @@ void add_plant_options(CLI::App &command, plant_arguments &arguments)
                        "The array around the board: [array], [plant], [noise] and seed of this "
                        "scenario; its events and [chip] are the console's business here");
     command
-        .add_option("--set", arguments.sets, "key=value as if the scenario said so, as with run")
+        .add_option("--set", arguments.sets,
+                    "key=value as if the scenario said so, as with run; again for another")
         ->take_all()
         ->allow_extra_args(false);
 }

@@ -187,7 +187,7 @@ public:
             event.word = scenario_word::on;
             count(2, 3, "on K [percent]");
             event.springs = springs(words_[1], true);
-            event.amount = words_.size() == 3 ? amount(words_[2], 0.0, 100.0) : 100.0;
+            event.amount = words_.size() == 3 ? percent(words_[2], "a level") : 100.0;
         } else if (first == "off") {
             event.word = scenario_word::off;
             count(2, 2, "off K|all");
@@ -206,10 +206,7 @@ public:
         } else if (first == "fan") {
             event.word = scenario_word::fan;
             count(2, 2, "fan 0..100");
-            event.amount = amount(words_[1], 0.0, 100.0);
-            if (event.amount != std::floor(event.amount)) {
-                throw wrong("the fan takes whole percent");
-            }
+            event.amount = percent(words_[1], "the fan");
         } else if (first == "ambient") {
             event.word = scenario_word::ambient;
             count(2, 2, "ambient DEGC");
@@ -233,7 +230,8 @@ public:
             failure(event);
         } else if (first[0] == '$' || first[0] == '?' || first == "telemetry" || first == "model" ||
                    first == "supply" || first == "learnt" || first == "faults" ||
-                   first == "selftest" || first == "help" || first == "version") {
+                   first == "selftest" || first == "help" || first == "version" || first == "why" ||
+                   first == "echo") {
             event.word = scenario_word::console;
         } else {
             throw wrong(fmt::format(
@@ -269,6 +267,15 @@ private:
         }
         if (!(value >= low && value <= high)) {
             throw wrong(fmt::format("{} is {}; it must be {} to {}", words_[0], value, low, high));
+        }
+        return value;
+    }
+
+    [[nodiscard]] double percent(const std::string &word, const char *what) const
+    {
+        const double value = amount(word, 0.0, 100.0);
+        if (value != std::floor(value)) {
+            throw wrong(fmt::format("{} takes whole percent", what));
         }
         return value;
     }

@@ -195,6 +195,8 @@ TEST(scenario_events_with_errors_are_refused)
     refuses_of_two("111101111/00001000x", "stiffness pattern '00001000x' holds something else");
     refuses("at 5 = policy best", "s.ini:4:8: ", "open or precompensate");
     refuses("at 5 = fan 101", "s.ini:4:8: ", "0 to 100");
+    refuses("at 5 = fan 12.5", "s.ini:4:8: ", "whole percent");
+    refuses("at 5 = on 5 0.5", "s.ini:4:8: ", "whole percent");
     refuses("at 5 = ambient 51", "s.ini:4:8: ", "-40 to 50");
     refuses("at 5 = fail melt 1", "s.ini:4:8: ", "fail what? open K, short K, closed K, nack K");
     refuses("at 5 = fail open", "s.ini:4:8: ", "fail open K");
