@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -233,7 +234,15 @@ def test_a_first_reading_that_is_a_spike_is_where_no_simulation_starts(make_log,
     clean, run = read_log(make_log("clean.csv")), read_log(make_log(change=spike))
     assert run.temperature_c[0, 1] == clean.temperature_c[1, 1]
     assert np.array_equal(np.delete(run.temperature_c, 1, axis=1), np.delete(clean.temperature_c, 1, axis=1))
-    assert any("t2_c: the first reading" in note for note in run.notes)
+    (said,) = (re.search(r"t2_c: the first reading, (\S+) degC", note) for note in run.notes if "first reading" in note)
+    assert said and float(said[1]) == pytest.approx(clean.temperature_c[0, 1] + off_k, abs=0.01)
+
+
+def test_a_first_reading_a_step_beside_the_next_is_no_spike(tmp_path: Path) -> None:
+    shown = np.round(2.0 * (21.0 + 6.0 * np.clip(np.arange(300) - 100, 0, 100) / 100.0)) / 2.0
+    shown[0] = 20.5
+    run = read(tmp_path, HEADER + "".join(f"{k},{100 <= k < 200:d},{one:.1f}\n" for k, one in enumerate(shown)))
+    assert run.temperature_c[0, 0] == 20.5 and not any("first reading" in note for note in run.notes)
 
 
 def test_a_spring_that_is_heated_or_cools_from_the_first_row_on_begins_where_it_is_read(make_log) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ninespring.find import certainty, contacts, diagnosis, evidence, resistance, unknown_heat
+from ninespring.find import certainty, contacts, diagnosis, evidence, residual, resistance, unknown_heat
 from ninespring.find.readings import Readings, readings
 from ninespring.infer.declared import base_spec
 from ninespring.infer.fit import Fit
@@ -121,6 +121,26 @@ def test_a_thermometer_that_jumps_as_its_spring_transforms_is_told(
     (one,) = (one for one in unknown_heat.find(problem, fit).events if one.kind == "sensor")
     assert one.spring == k + 1 and one.from_s == pytest.approx(200, abs=15)
     assert one.size == pytest.approx(4.0, abs=0.3)
+
+
+def test_what_relieves_nothing_explains_no_part_of_it(make_log, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Random effects lie as far apart without an effect as with it, and no farther than is believed."""
+    run = read_log(make_log(effects={"edge_loss": {}}, seconds=300))
+    problem, fit, base = diagnosis.fit_effects(Array(), [run], ["edge_loss"])
+    plain = certainty.witness(problem, fit, "edge_loss", base, False)
+    monkeypatch.setattr(certainty, "relief", lambda *fits: 1.0)
+    monkeypatch.setattr(certainty, "strain", lambda *fits: 0.0)
+    assert certainty.witness(problem, fit, "edge_loss", base, False) == plain
+
+
+def test_a_run_that_is_shorter_than_what_is_late_does_not_hide_the_others(tmp_path: Path) -> None:
+    def heated(shown: np.ndarray) -> None:
+        shown[:, 4] += 8.0 * np.sin(np.arange(len(shown)) / 60.0)
+
+    long, _ = array_log(tmp_path / "log.csv", thermometers=heated)
+    problem = Problem(Array(), [long.runs[0], long.runs[0].part(slice(100))])
+    said, note = residual.depends_on(problem, diagnosis.first_fit(problem, base_spec(problem)))
+    assert "spring 5" in note and said
 
 
 @pytest.mark.parametrize(("end", "told"), [(400, True), (205, False)])

@@ -105,8 +105,8 @@ def witness(problem: Problem, fit: Fit, effect: str, without: Fit, flexible: boo
         # of how far random effects lie apart beyond what is believed, it explains a part, too
         numbers = sum(free.effect is not None and free.trust > 0.0 for free in without.spec.free)
         strained = strain(without, fit)
-        relieved = strained - strain(fit, without)
-        share = max(share, relieved / max(relieved, strained - 0.5 * numbers))
+        if (relieved := strained - strain(fit, without)) > 0.0:
+            share = max(share, relieved / max(relieved, strained - 0.5 * numbers))
     return Witness(
         log_evidence(problem, fit, without),
         min(1.0, max(0.0, share)),

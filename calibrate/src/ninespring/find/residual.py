@@ -77,10 +77,10 @@ def _inputs(
     weight = np.minimum(1.0, np.sqrt(squares / max(1e-12, float(np.nanmax(squares)))))
     step = float(np.median(np.diff(problem.runs[0].time_s))) * WIDTH
     out = []
-    for name, given in series.items():
+    for name, found in series.items():
         best = (0.0, 0.0, 0, -1)
         for lag in LAGS if name != "time" else (0,):
-            x = np.concatenate([one[: len(one) - lag] for one in given])
+            x = np.concatenate([one[: max(0, len(one) - lag)] for one in found])
             for k, y in enumerate(np.concatenate([b[lag:] for b in blocks]).T):
                 good = np.isfinite(y)
                 if good.sum() < 10 or np.std(x[good]) < 1e-12 or np.std(y[good]) < 1e-12:

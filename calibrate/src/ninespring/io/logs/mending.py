@@ -293,7 +293,7 @@ def mend_first_reading(run: Run) -> None:
 
     The thermometer then begins at its next one: a simulation starts there.
     """
-    noise = noise_floor(run.temperature_c)
+    noise = np.maximum(noise_floor(run.temperature_c), rounding(run.temperature_c))
     for k in range(run.springs):
         values = run.temperature_c[:4, k]
         if len(values) < 4 or not np.isfinite([*values, noise[k]]).all():
@@ -305,8 +305,8 @@ def mend_first_reading(run: Run) -> None:
         usual = float(np.nanquantile(moves, 0.99)) if heated else 0.0
         most = QUICKER * max(usual, float(moves[:2].max()))
         if abs(jump) > 10.0 * max(float(noise[k]), 0.02) + most:
-            run.temperature_c[0, k] = values[1]
             run.notes.append(f"t{k + 1}_c: the first reading, {values[0]:g} degC, is a spike, left out")
+            run.temperature_c[0, k] = values[1]
 
 
 def mend_ambient(run: Run) -> None:
