@@ -283,6 +283,14 @@ def test_a_run_that_was_heated_before_says_nothing_of_its_room() -> None:
     assert room.over_first(runs, [22.1, 22.9, 10.0, 10.0, 10.0]) == pytest.approx((0.1, 0.3 * math.sqrt(1.5)), abs=0.01)
 
 
+@pytest.mark.parametrize(("above_k", "rests"), [(5.0, True), (8.0, False)])
+def test_a_thermometer_alone_is_together_with_itself_however_it_was_warmed(above_k: float, rests: bool) -> None:
+    alone = [one_run(21.0, 21.0, 0.0), one_run(21.0 + above_k, 21.0 + above_k, 0.0)]
+    both = [replace(one, temperature_c=np.column_stack([one.temperature_c, one.temperature_c])) for one in alone]
+    assert room.rested(alone) == [True, rests]
+    assert room.rested(both) == [True, True]
+
+
 def test_how_far_above_its_room_a_run_begins_that_was_heated_before_is_its_own() -> None:
     """That others began so says little of one that begins at rest: it is not so much warmer than its room."""
     runs = [one_run(28.0, 28.0, 0.0), one_run(28.2, 28.2, 0.0)]

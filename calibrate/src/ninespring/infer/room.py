@@ -90,11 +90,13 @@ def _begins_at(run: Run) -> tuple[float, float]:
 def rested(runs: Sequence[Run]) -> list[bool]:
     """Return which runs began at their room: thermometers together, no hotter than rooms are nor than they differ from the coldest such start.
 
-    One such run alone may have begun as no other does: it did not where the others began warmer, and not together.
+    One such run alone may have begun as no other does: it did not where the others began warmer, and not together. A thermometer alone
+    is together with itself however it was warmed: rooms of two days tell, not all that rooms can be.
     """
     begins = [(math.nan, math.inf) if run.warm else _begins_at(run) for run in runs]
     together = [first for first, apart in begins if apart <= TOGETHER_K]
-    most = min(HOTTEST_C, min(together, default=HOTTEST_C) + 4.0 * ROOMS_K)
+    apart_k = (4.0 if runs[0].springs > 1 else 2.0) * ROOMS_K
+    most = min(HOTTEST_C, min(together, default=HOTTEST_C) + apart_k)
     found = [apart <= TOGETHER_K and first <= most for first, apart in begins]
     coldest = min((first for first, _ in begins if math.isfinite(first)), default=math.nan)
     one_of_others = len(runs) > 1 and any(
