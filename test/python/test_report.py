@@ -6,6 +6,7 @@ import copy
 import dataclasses
 import re
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import msgspec
 import numpy as np
@@ -220,3 +221,10 @@ def test_the_terminal_tells_what_acts_without_a_name(capsys: pytest.CaptureFixtu
     )
     command._print_diagnosis(told(unnamed=[cause]), "Missing: nothing.")
     assert "a cause without a name: Spring 8 is given heat" in capsys.readouterr().out
+
+
+def test_the_next_commands_say_what_was_typed() -> None:
+    told = SimpleNamespace(logs=[SimpleNamespace(file="a.csv")], doubts=["columns 1 and 2 are swapped"], rivals=[])
+    assert report.next_steps(told, "out")[-1].startswith("ninespring diagnose a.csv -o out ")
+    typed = report.next_steps(told, "out", "--model m.toml logs/a.csv")
+    assert typed[-1].startswith("ninespring diagnose --model m.toml logs/a.csv -o out ")

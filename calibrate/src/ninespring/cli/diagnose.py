@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import click
@@ -59,6 +60,9 @@ def diagnose(
     if frozen and not model_path:
         raise InputError("--frozen needs --model")
     model, array = model_and_array(model_path, array_path)
+    # as it was typed, for what the report says to type next
+    given = {"--array": array_path, "--model": model_path}
+    asked = shlex.join([word for name, path in given.items() if path for word in (name, str(path))] + [*map(str, logs)])
     told: results.SteadyDiagnosis | results.BoardDiagnosis | results.Diagnosis
     if any(steady.is_steady(path) for path in logs):
         if len(logs) > 1:
@@ -73,14 +77,14 @@ def diagnose(
                 raise InputError("without a thermometer give logs and an array only, no --model", logs[0])
             with working("fitting v / i") as say:
                 alone, made = board_alone.diagnose(array, runs, say)
-            told, page = alone, report.board_report(alone, str(output))
+            told, page = alone, report.board_report(alone, str(output), asked)
         else:
             with working("fitting") as say:
                 found = diagnosis.diagnose(array, runs, model=model, frozen=frozen, progress=say)
                 found.model.name = str(output / "model.toml")
                 judged(found.told.effects, found.model)  # as commands that can be typed here
                 say("writing the report")
-                page = report.html_report(found, str(output))
+                page = report.html_report(found, str(output), asked)
             told, made = found.told, found.model
     make_folder(output)
     write(report.files_of(output, told, page, made) | {json_path: results.checked(told)})

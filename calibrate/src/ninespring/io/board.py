@@ -529,7 +529,7 @@ def send_settings(
 
 def _taken_back(board: Board, sent: Mapping[str, str], before: Mapping[str, str]) -> str:
     """Give a board back what it had before settings that it does not take; return what is to be said of that."""
-    had = {name: before[name] for name in reversed(sent) if name in before}
+    had = {name: before[name] for name in reversed(list(sent)) if name in before}
     try:
         has = board.settings()
         for name, value in had.items():

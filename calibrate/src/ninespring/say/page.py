@@ -106,9 +106,9 @@ def _sentence(text: str) -> str:
     return text[0].upper() + text[1:] + "."
 
 
-def next_steps(told: results.Told, folder: str) -> list[str]:
-    """Return what to do next, as commands; `folder` is where the diagnosis is written."""
-    logs = " ".join(log.file for log in told.logs)
+def next_steps(told: results.Told, folder: str, asked: str = "") -> list[str]:
+    """Return what to do next, as commands; `folder` is where the diagnosis is written, `asked` of what it is, as it was typed."""
+    logs = asked or " ".join(log.file for log in told.logs)
     if doubts := getattr(told, "doubts", []):
         return [
             *(f"# {text}" for text in doubts),
@@ -148,8 +148,8 @@ def files_of(folder: Path, told: results.Told, page: str, model: Model) -> dict[
     return {folder / name: text for name, text in zip(results.FILES, texts, strict=True)}
 
 
-def html_report(found: Diagnosis, folder: str = "diagnosis") -> str:
-    """Return the report as HTML; `folder` is where the diagnosis is written."""
+def html_report(found: Diagnosis, folder: str = "diagnosis", asked: str = "") -> str:
+    """Return the report as HTML; `folder` is where the diagnosis is written, `asked` of what it is, as it was typed."""
     told = found.told
     return render(
         "diagnosis.html",
@@ -158,7 +158,7 @@ def html_report(found: Diagnosis, folder: str = "diagnosis") -> str:
         verdict=verdict(told),
         findings=findings(told),
         cut_short=cut_short(told.warnings),
-        next_steps=next_steps(told, folder),
+        next_steps=next_steps(told, folder, asked),
         found=found,
         figures=figures,
         numbers={name: one for effect in told.effects for name, one in effect.parameters.items()},
@@ -180,8 +180,8 @@ def steady_report(told: results.SteadyDiagnosis) -> str:
     )
 
 
-def board_report(told: results.BoardDiagnosis, folder: str = "diagnosis") -> str:
-    """Return the report of a diagnosis without thermometers as HTML."""
+def board_report(told: results.BoardDiagnosis, folder: str = "diagnosis", asked: str = "") -> str:
+    """Return the report of a diagnosis without thermometers as HTML; `folder` and `asked` as of `html_report`."""
     return render(
         "board.html",
         title="Ninespring diagnosis",
@@ -189,7 +189,7 @@ def board_report(told: results.BoardDiagnosis, folder: str = "diagnosis") -> str
         verdict=board_verdict(told),
         findings=[(f"{one.certainty}, {100 * one.probability:.0f} %", one.text) for one in told.effects],
         cut_short=cut_short(told.warnings),
-        next_steps=next_steps(told, folder),
+        next_steps=next_steps(told, folder, asked),
     )
 
 
