@@ -238,6 +238,19 @@ def test_a_first_reading_that_is_a_spike_is_where_no_simulation_starts(make_log,
     assert said and float(said[1]) == pytest.approx(clean.temperature_c[0, 1] + off_k, abs=0.01)
 
 
+@pytest.mark.parametrize("hotter", [False, True])
+def test_a_spring_that_has_settled_is_neither_frozen_nor_saturated(tmp_path: Path, hotter: bool) -> None:
+    """Its thermometer steps by half a kelvin, and what measures its current is noisy."""
+    rng, since = np.random.default_rng(3), np.arange(2600)
+    amps = np.where(since < 1500, 0.3, 0.5 if hotter else 0.1) + rng.normal(0.0, 1e-3, 2600)
+    shown = 36.6 + (12.0 if hotter else -8.0) * (1.0 - np.exp(-np.clip(since - 1500, 0, None) / 300.0))
+    shown -= 12.0 * np.exp(-since / 90.0)
+    rows = "".join(f"{k},{a:.4f},{t:.1f}\n" for k, a, t in zip(since, amps, np.round(2.0 * shown) / 2.0, strict=True))
+    run = read(tmp_path, HEADER + rows)
+    assert not any("frozen" in note or "saturated" in note for note in run.notes), run.notes
+    assert np.isfinite(run.temperature_c).all()
+
+
 def test_a_first_reading_a_step_beside_the_next_is_no_spike(tmp_path: Path) -> None:
     shown = np.round(2.0 * (21.0 + 6.0 * np.clip(np.arange(300) - 100, 0, 100) / 100.0)) / 2.0
     shown[0] = 20.5

@@ -25,6 +25,10 @@ SPARSE_S = 100.0
 DAY_S = 86400.0
 FEW = 0.01
 """Part of the rows: so many times may be there twice, as programs log that simulate by steps. More are of a clock that is too coarse."""
+STOPPED_ROWS = 30
+"""In so many rows before it stays where it is a sensor that something stops has moved by more than its steps."""
+SWITCHED = 0.05
+"""Of a spring's range of drive: what changes by more is switched, and no noise of what measured it."""
 RESTED_K = 3.0
 """How far below its first readings a spring may come that began at its room: a room drifts, in Fahrenheit twice as far."""
 ROOM_C, ROOM_K = 22.0, 6.0
@@ -166,7 +170,7 @@ def mask_bad_sensors(run: Run) -> None:
             elsewhere = _stands(inner)[1].max(initial=0)
             # Ordinary quantisation also repeats values; a clipped sensor stays at ITS extreme far longer
             # than it ever stays at any other value.
-            if inner.size >= 10 and longest >= 15 and longest > 4 * elsewhere:
+            if inner.size >= 10 and longest >= 15 and longest > 4 * elsewhere and _is_stopped(run, k, seen, extreme):
                 # near the limit only what the noise carried down is seen: those rows would pull the fit
                 run.temperature_c[seen[np.abs(measured - extreme) <= 4.0 * noise[k]], k] = np.nan
                 run.notes.append(
@@ -174,6 +178,24 @@ def mask_bad_sensors(run: Run) -> None:
                     "saturated, those rows left out"
                 )
         _mask_frozen(run, k)
+
+
+def _is_stopped(run: Run, k: int, seen: np.ndarray, extreme: float) -> bool:
+    """Return whether something stopped a sensor where it stays longest at an extreme: it was on its way there, or its spring's drive changed
+    meanwhile. A spring that has settled stays where it is, too."""
+    measured = run.temperature_c[seen, k]
+    begins, lengths = _stands(measured)
+    longest = int(np.argmax(np.where(measured[begins] == extreme, lengths, 0)))
+    begin, end = int(begins[longest]), int(begins[longest] + lengths[longest])
+    moves = np.abs(np.diff(measured))
+    step = float(moves[moves > 0].min(initial=np.inf))
+    on_its_way = begin > 0 and float(np.ptp(measured[max(0, begin - STOPPED_ROWS) : begin])) > 3.0 * step
+    return on_its_way or bool(_switches(run, k, seen[begin:end]).size)
+
+
+def _switches(run: Run, k: int, rows: np.ndarray) -> np.ndarray:
+    """Return after which of some rows a spring's drive changes by more than the noise of what measured it."""
+    return np.flatnonzero(np.abs(np.diff(run.drive[rows, k])) > SWITCHED * np.ptp(run.drive[:, k]))
 
 
 def _stands(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -190,7 +212,7 @@ def _mask_frozen(run: Run, k: int) -> None:
         return
     longest = int(np.argmax(lengths))
     rows = seen[begins[longest] :][: lengths[longest]]
-    moved = np.flatnonzero(np.diff(run.drive[rows, k]) != 0)
+    moved = _switches(run, k, rows)
     since = len(rows) - int(moved[0]) if moved.size else 0
     if since >= 30 and since > 4 * np.delete(lengths, longest).max():
         shown = run.temperature_c[rows[0], k]
