@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 MAX_LINE = 100_000
 """A line longer than this (characters) is not a log."""
+UNMEASURED = ["", "nan", "NaN", "NAN"]
+"""Cells of what was not measured, as programs write them."""
 
 
 class Table:
@@ -139,7 +141,7 @@ class Table:
                 header=None,
                 names=self.names,
                 dtype={name: (str if name in words else np.float64) for name in self.names},
-                na_values=[""],
+                na_values=UNMEASURED,
                 keep_default_na=False,
                 skipinitialspace=True,
                 skip_blank_lines=False,
@@ -162,7 +164,7 @@ class Table:
                 return self.refuse(said, self._numbers[row], 1)
             for name, cell in zip(self.names, line.split(","), strict=True):
                 value = cell.strip()
-                if name in words or not value or (number_in(value) is not None and "_" not in value):
+                if name in words or value in UNMEASURED or (number_in(value) is not None and "_" not in value):
                     continue
                 advice = "leave the cell empty if not measured"
                 if re.fullmatch(r"[ivuf][0-9].*|fan", name):
