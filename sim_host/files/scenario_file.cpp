@@ -123,9 +123,9 @@ int whole(const raw_entry &entry, int low, int high)
     for (const std::string &name : names) {
         list += (list.empty() ? "" : ", ") + name;
     }
-    throw entry.key_place.error(fmt::format("[{}] has no key {}{}; it has {}", entry.section,
-                                            in_quotes(entry.key), did_you_mean(entry.key, names),
-                                            list));
+    throw entry.key_place.error(fmt::format("[{}] has no key {} (it has {}){}", entry.section,
+                                            in_quotes(entry.key), list,
+                                            did_you_mean(entry.key, names)));
 }
 
 std::vector<std::string> words_of(std::string_view text)
@@ -235,8 +235,8 @@ public:
             event.word = scenario_word::console;
         } else {
             throw wrong(fmt::format(
-                "there is no word {}{}; events have on, off, pattern, policy, fan, ambient, clear, "
-                "unlock, !, room, set, fail, repair",
+                "there is no word {} (events have on, off, pattern, policy, fan, ambient, clear, "
+                "unlock, !, room, set, fail, repair){}",
                 in_quotes(first),
                 did_you_mean(first, {"on", "off", "pattern", "policy", "fan", "ambient", "clear",
                                      "unlock", "room", "set", "fail", "repair", "telemetry"})));
@@ -365,6 +365,9 @@ private:
         count(words, words, fmt::format("{} {}{}", words_[0], found->name, after).c_str());
         for (std::size_t k = 0; k < found->springs; ++k) {
             event.springs.push_back(springs(words_[2 + k], false)[0]);
+        }
+        if (event.springs.size() == 2 && event.springs[0] == event.springs[1]) {
+            throw wrong(fmt::format("{} takes two springs", found->name));
         }
         if (scales) {
             event.amount = amount(words_[3], 0.0, 100.0);

@@ -195,6 +195,7 @@ TEST(scenario_events_with_errors_are_refused)
     refuses_of_two("111101111/00001000x", "stiffness pattern '00001000x' holds something else");
     refuses("at 5 = policy best", "s.ini:4:8: ", "open or precompensate");
     refuses("at 5 = fan 101", "s.ini:4:8: ", "0 to 100");
+    refuses("at 5 = fail swap 2 2", "s.ini:4:8: ", "two springs");
     refuses("at 5 = fan 12.5", "s.ini:4:8: ", "whole percent");
     refuses("at 5 = on 5 0.5", "s.ini:4:8: ", "whole percent");
     refuses("at 5 = ambient 51", "s.ini:4:8: ", "-40 to 50");

@@ -73,6 +73,7 @@ def test_a_function_refuses_what_its_option_refuses(bad: object) -> None:
         ("dashboard", "give one of --port, --simulate, --replay"),
         ("dashboard --simulate --port x", "give one of --port, --simulate, --replay"),
         ("dashboard --simulate --listen here", "not HOST:PORT"),
+        ("dashboard --simulate --speed 3", "--speed goes with --replay"),
         ("dashboard --replay no-such.csv", "no-such.csv: cannot be read"),
         ("calibrate", "give --port, or --simulate"),
         ("calibrate --port /dev/x --simulate", "give --port, or --simulate"),

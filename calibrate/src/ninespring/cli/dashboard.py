@@ -32,7 +32,7 @@ Examples:
 @click.option("--replay", type=FILE, help="log to play again")
 @click.option("--model", "model_path", type=FILE, help="with --replay: model.toml, shown beside what was measured")
 @ARRAY
-@number("--speed", ranges.REPLAY_SPEED, "with --replay: times real time", 1.0)
+@number("--speed", ranges.REPLAY_SPEED, "with --replay: times real time  [default: 1]")
 @number("--hz", ranges.DASHBOARD_HZ, "rows a second from the board", 10)
 @click.option("--folder", type=click.Path(True, False, path_type=Path), default=Path(), help="where recordings go")
 @click.option("--listen", "address", default=USUAL, help="HOST:PORT of the page; port 0: any free one")
@@ -50,7 +50,7 @@ def dashboard(
     replay: Path | None,
     model_path: Path | None,
     array_path: Path | None,
-    speed: float,
+    speed: float | None,
     hz: int,
     folder: Path,
     address: str,
@@ -65,6 +65,8 @@ def dashboard(
         raise InputError("give one of --port, --simulate, --replay")
     if (model_path or array_path) and not replay:
         raise InputError("--model and --array go with --replay")
+    if speed is not None and not replay:
+        raise InputError("--speed goes with --replay")
     host, colon, number = address.rpartition(":")
     if not colon or not number.isdigit() or int(number) > 65535:
         raise InputError(f"--listen {address}: not HOST:PORT, as in {USUAL}")
@@ -79,7 +81,7 @@ def dashboard(
         notes_of([run])
         array = array_of(array, [run])
         array.one_layer("the dashboard shows")
-        source = ReplaySource(run, array.rows, array.cols, model, speed)
+        source = ReplaySource(run, array.rows, array.cols, model, speed or 1.0)
     else:
         if simulate:
             simulator()  # what is not built does not come back, as a port does

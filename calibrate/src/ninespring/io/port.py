@@ -45,7 +45,7 @@ class Port:
             if number in (errno.EACCES, errno.EPERM):
                 raise WorkError(f"{name}: this user may not open it: {_how_to_be_allowed(name)}") from None
             reason = os.strerror(number) if number else "not a serial port"
-            raise WorkError(f"{name}: cannot be opened ({reason}): is the board there, is the port free?") from None
+            raise WorkError(f"{name}: cannot be opened ({reason}): is it plugged in, is the port free?") from None
 
     @property
     def resets_the_board(self) -> bool:
