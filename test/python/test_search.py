@@ -530,12 +530,14 @@ def test_the_experiment_that_separates_is_one_in_which_both_models_differ(make_l
 
 def test_a_drift_of_these_runs_is_said_and_left_out_of_the_model(make_log, tmp_path: Path) -> None:
     drift = {"ambient_drift": {"ambient_amplitude_k": 4.0, "ambient_period_s": 1100.0, "ambient_ramp_k_per_h": 0.0}}
-    found = diagnosis.diagnose(Array(), [read_log(make_log(effects=drift, seconds=900))])
+    run = read_log(make_log(effects=drift, seconds=900))
+    found = diagnosis.diagnose(Array(), [run])
     effect = found.result["effects"][0]
     assert (effect["name"], effect["variant"]) == ("ambient_drift", "free")
     assert found.model.effects == []
     assert found.model.provenance["note"] == diagnosis.DRIFT_LEFT_OUT
-    assert any(diagnosis.DRIFT_LEFT_OUT in text for text in found.result["warnings"])
+    (said,) = (text for text in found.result["warnings"] if diagnosis.DRIFT_LEFT_OUT in text)
+    assert ("nearer to the springs" in said) == (run.ambient_c is not None)
 
 
 def test_a_run_that_does_not_begin_as_logged_is_said(make_log) -> None:

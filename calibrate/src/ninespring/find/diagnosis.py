@@ -692,7 +692,9 @@ def _warned(
     warnings = [f"{Path(run.name).name}: {text}" for run in problem.runs for text in run.notes]
     warnings += case.not_kept
     if any(free.knot is not None for free in final.spec.free):
-        warnings.append(f"model.toml: {DRIFT_LEFT_OUT}; log ambient_c to have it predicted")
+        logged = all(run.ambient_c is not None for run in problem.runs)
+        how = "log ambient_c nearer to the springs (their own thermometers, drifting, show the same)"
+        warnings.append(f"model.toml: {DRIFT_LEFT_OUT}; {how if logged else 'log ambient_c'} to have it predicted")
     if left_over and problem.budget.short:
         warnings.append(
             f"the search ended at its bound of {problem.budget.enough} simulations: there may be more to find"
