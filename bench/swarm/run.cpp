@@ -565,7 +565,8 @@ private:
                 breaks("fed", text);
             }
         }
-        if (fed && hanging_ && now_s() - hang_s_ > UNFED_S) {
+        /* the pin's own edge, as it is shorted, is a pulse */
+        if (fed && hanging_ && now_s() - std::fmax(hang_s_, shorted_s_) > UNFED_S) {
             breaks("fed", "no program runs");
         }
         if (fed && unfed_s_ >= 0.0 && now_s() - unfed_s_ > UNFED_S) {
