@@ -522,22 +522,23 @@ def send_settings(
     try:
         _send(board, settings, say)
     except WorkError as error:
-        raise WorkError(f"{error}: {_taken_back(board, settings, before)}") from None
+        left = UNSAVED if give_back(board, settings, before) else "nothing is saved, the board has what it had"
+        raise WorkError(f"{error}: {left}") from None
     if save:
         board.ask("$save", 10.0)
 
 
-def _taken_back(board: Board, sent: Mapping[str, str], before: Mapping[str, str]) -> str:
-    """Give a board back what it had before settings that it does not take; return what is to be said of that."""
-    had = {name: before[name] for name in reversed(list(sent)) if name in before}
+def give_back(board: Board, names: Iterable[str], before: Mapping[str, str]) -> list[str]:
+    """Give a board back what it had of settings before; return, in words, what it has otherwise all the same."""
+    had = {name: before[name] for name in names if name in before}
     try:
         has = board.settings()
-        for name, value in had.items():
+        for name, value in reversed(had.items()):
             if has.get(name) != value:
                 board.ask(f"${name}={value}")
-        return UNSAVED if settings_that_differ(had, board.settings()) else "nothing is saved, the board has what it had"
+        return settings_that_differ(had, board.settings())
     except WorkError:
-        return UNSAVED
+        return ["it does not answer"]
 
 
 def _send(board: Board, settings: Mapping[str, str], say: Callable[[str, int], None]) -> None:

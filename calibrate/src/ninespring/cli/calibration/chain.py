@@ -23,7 +23,7 @@ from ...find import diagnosis
 from ...find.plan import make_plan
 from ...infer.predict import chip_errors
 from ...io import history, results
-from ...io.board import Board, as_lines, send_settings, settings_that_differ
+from ...io.board import Board, as_lines, give_back, send_settings, settings_that_differ
 from ...io.logs import Run, read_bytes, read_log, write_atomically
 from ...io.logs.mending import RUN_IN_S
 from ...io.recording import LogFile, Recording, Step, about, record, script_lines, told_to_stop
@@ -427,12 +427,9 @@ class Calibration:
 
     def _take_back(self, settings: Mapping[str, str]) -> None:
         """Give the board back the settings that it had in place of these: nothing of them was saved."""
-        old = {name: self.had[name] for name in settings if name in self.had}
         try:
-            for line in as_lines(old).splitlines():
-                self.board.ask(line)
-            wrong = settings_that_differ(old, self.board.settings())
-        except (WorkError, KeyboardInterrupt):
+            wrong = give_back(self.board, settings, self.had)
+        except KeyboardInterrupt:
             wrong = ["it does not answer"]
         if wrong:
             self._tell(

@@ -166,11 +166,18 @@ def mask_bad_sensors(run: Run) -> None:
                 run.notes.append(f"t{k + 1}_c never moves ({measured[0]:g} degC): dead sensor, left out")
                 continue
         for edge, extreme in (("highest", measured.max()), ("lowest", measured.min())):
-            longest, inner = lengths[measured[begins] == extreme].max(), measured[measured != extreme]
+            at = int(np.argmax(np.where(measured[begins] == extreme, lengths, 0)))
+            begin, longest, inner = int(begins[at]), int(lengths[at]), measured[measured != extreme]
+            switched = _switches(run, k, seen[begin : begin + longest]).size > 0
             elsewhere = _stands(inner)[1].max(initial=0)
             # Ordinary quantisation also repeats values; a clipped sensor stays at ITS extreme far longer
             # than it ever stays at any other value.
-            if inner.size >= 10 and longest >= 15 and longest > 4 * elsewhere and _is_stopped(run, k, seen, extreme):
+            if (
+                inner.size >= 10
+                and longest >= 15
+                and longest > 4 * elsewhere
+                and _is_stopped(measured, begin, switched)
+            ):
                 # near the limit only what the noise carried down is seen: those rows would pull the fit
                 run.temperature_c[seen[np.abs(measured - extreme) <= 4.0 * noise[k]], k] = np.nan
                 run.notes.append(
@@ -180,17 +187,12 @@ def mask_bad_sensors(run: Run) -> None:
         _mask_frozen(run, k)
 
 
-def _is_stopped(run: Run, k: int, seen: np.ndarray, extreme: float) -> bool:
-    """Return whether something stopped a sensor where it stays longest at an extreme: it was on its way there, or its spring's drive changed
+def _is_stopped(measured: np.ndarray, begin: int, switched: bool) -> bool:
+    """Return whether something stopped a sensor where it begins to stay at an extreme: it was on its way there, or its spring's drive changes
     meanwhile. A spring that has settled stays where it is, too."""
-    measured = run.temperature_c[seen, k]
-    begins, lengths = _stands(measured)
-    longest = int(np.argmax(np.where(measured[begins] == extreme, lengths, 0)))
-    begin, end = int(begins[longest]), int(begins[longest] + lengths[longest])
     moves = np.abs(np.diff(measured))
     step = float(moves[moves > 0].min(initial=np.inf))
-    on_its_way = begin > 0 and float(np.ptp(measured[max(0, begin - STOPPED_ROWS) : begin])) > 3.0 * step
-    return on_its_way or bool(_switches(run, k, seen[begin:end]).size)
+    return switched or (begin > 0 and float(np.ptp(measured[max(0, begin - STOPPED_ROWS) : begin])) > 3.0 * step)
 
 
 def _switches(run: Run, k: int, rows: np.ndarray) -> np.ndarray:
