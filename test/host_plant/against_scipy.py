@@ -55,14 +55,14 @@ SCALARS = {
     "wake_w_per_k": (0, 2e-3),
     "edge_loss_fraction": (0, 0.3),
     "edge_loss_fan_share": (0, 2),
-    "supply_resistance_ohm": (0, 0.5),
+    "supply_resistance_ohm": (0, 1),  # over all springs: a supply is made for its array
     "ambient_ramp_k_per_h": (-20, 20),
     "ambient_amplitude_k": (0, 3),
     "ambient_period_s": (100, 1000),
     "ambient_phase_rad": (-3, 3),
     "optical_share": (0, 0.9),
     "optical_width": (0.3, 2.5),
-    "optical_shape": (0.7, 8),
+    "optical_shape": (1, 8),  # a smaller one has more beyond 12 widths, where the plant ends its sum, than the limit
     "optical_beyond": (0, 1),
     "optical_background": (0, 0.3),
     "optical_background_rise_k": (0, 10),
@@ -366,6 +366,7 @@ def compare(lib: ctypes.CDLL, seed: int) -> tuple[float, float, str]:
     on = {e for k, e in enumerate(effects) if k == seed % len(effects) or rng.random() < 0.4}
     values: dict = {k: rng.uniform(*r) for k, r in SCALARS.items()}
     values |= {k: rng.uniform(*r, n) for k, r in EACH.items()}
+    values["supply_resistance_ohm"] /= n
     values["wake_direction"] = float(rng.integers(0, 4))
     values["convection_correlation"] = float(rng.integers(0, 2))
     modes = rng.choice(MODES, n).astype(np.int32)
