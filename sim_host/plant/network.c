@@ -78,7 +78,7 @@ void plant_network_flows(plant_t *p, double time_s, const double *t, const doubl
     const int n = p->n;
     const double ambient = plant_network_ambient(p, time_s);
     const bool shared_air = p->on[E_shared_air], plate = p->on[E_plate_conduction];
-    const bool natural = p->on[E_natural_convection];
+    const bool natural = p->on[E_natural_convection], holders = p->on[E_holder_mass];
     const double air = shared_air ? t[n] : ambient;
     const double ambient_k2 = (ambient + KELVIN) * (ambient + KELVIN);
     double in_w = 0.0, to_air = 0.0, radiated = 0.0, to_plate[PLANT_MAX_LAYERS] = {0.0};
@@ -109,6 +109,11 @@ void plant_network_flows(plant_t *p, double time_s, const double *t, const doubl
             to_plate[layer] += w;
             q -= w;
         }
+        if (holders) { /* the only way out of a holder is back */
+            const double w = scalar(p, P_holder_coupling_w_per_k) * (ti - t[holder_node(p, i)]);
+            flows->q_w[holder_node(p, i)] = w;
+            q -= w;
+        }
         if (p->any_held && p->mode[i] == PLANT_DRIVE_TEMPERATURE) {
             p->power_w[i] = -q;
             q = -q;
@@ -120,7 +125,7 @@ void plant_network_flows(plant_t *p, double time_s, const double *t, const doubl
         }
     }
     double out_w = radiated;
-    for (int node = n; node < p->nodes; node++)
+    for (int node = n; node < holder_node(p, 0); node++)
         flows->q_w[node] = 0.0;
     if (shared_air) {
         const double w = scalar(p, P_air_exchange_w_per_k) * (air - ambient);
@@ -139,9 +144,21 @@ void plant_network_flows(plant_t *p, double time_s, const double *t, const doubl
     flows->out_w = out_w;
 }
 
+void plant_network_rest(plant_t *p)
+{
+    const double ambient = plant_network_ambient(p, p->time_s);
+    if (!p->on[E_shared_air])
+        p->temperature_c[p->n] = ambient;
+    for (int layer = 0; layer < p->layers && !p->on[E_plate_conduction]; layer++)
+        p->temperature_c[plate_node(p, layer)] = ambient;
+    for (int i = 0; i < p->n && !p->on[E_holder_mass]; i++)
+        p->temperature_c[holder_node(p, i)] = ambient;
+}
+
 void plant_network_prepare(plant_t *p)
 {
     const int n = p->n;
+    p->nodes = holder_node(p, p->on[E_holder_mass] ? n : 0);
     const bool mismatch = p->on[E_spring_mismatch];
     for (int i = 0; i < n; i++) {
         const double heavier = mismatch ? p->value[P_heat_capacity_scale][i] : 1.0;
@@ -162,16 +179,14 @@ void plant_network_prepare(plant_t *p)
     p->capacity[n] = scalar(p, P_air_heat_capacity_j_per_k);
     for (int layer = 0; layer < p->layers; layer++)
         p->capacity[plate_node(p, layer)] = scalar(p, P_plate_heat_capacity_j_per_k);
+    for (int i = 0; i < n; i++)
+        p->capacity[holder_node(p, i)] = scalar(p, P_holder_heat_capacity_j_per_k);
     for (int i = 0; i < p->nodes; i++)
         p->inverse_capacity[i] = 1.0 / p->capacity[i];
     p->radiation_w_per_k4 = p->on[E_radiation] ? scalar(p, P_emissivity) * STEFAN_BOLTZMANN * 1e-6 *
                                                      scalar(p, P_surface_mm2)
                                                : 0.0;
-    /* Nodes that are off stand at ambient, so that switching one on starts it there. */
-    if (!p->on[E_shared_air])
-        p->temperature_c[n] = plant_network_ambient(p, p->time_s);
-    for (int layer = 0; layer < p->layers && !p->on[E_plate_conduction]; layer++)
-        p->temperature_c[plate_node(p, layer)] = plant_network_ambient(p, p->time_s);
+    plant_network_rest(p);
 }
 
 /* Of all that the fan adds, the part that it adds at its present command: the odds f / (1 - f)
@@ -205,6 +220,7 @@ void plant_network_prepare_inputs(plant_t *p)
     p->wake = p->on[E_fan_wake] ? scalar(p, P_wake_w_per_k) * fan : 0.0;
     p->any_held = false;
     const bool shared_air = p->on[E_shared_air], plate = p->on[E_plate_conduction];
+    const double to_holder = p->on[E_holder_mass] ? scalar(p, P_holder_coupling_w_per_k) : 0.0;
     double fastest = 0.0, air_sum = scalar(p, P_air_exchange_w_per_k);
     double plate_sum = scalar(p, P_plate_loss_w_per_k); /* of all: no less than one's own */
     for (int i = 0; i < n; i++) {
@@ -217,7 +233,7 @@ void plant_network_prepare_inputs(plant_t *p)
         const int layer = layer_of(p, i);
         const double own = p->loss_sum[i] + p->wake * p->wake_scale[layer] +
                            4.0 * 1.1e8 * p->radiation_w_per_k4 +
-                           (plate ? p->value[P_plate_coupling_w_per_k][i] : 0.0);
+                           (plate ? p->value[P_plate_coupling_w_per_k][i] : 0.0) + to_holder;
         double coupled = 0.0;
         for (int kind = 0; kind < NEIGHBOUR_KINDS; kind++)
             coupled += p->coupling[kind][layer] * neighbour_count(p, (enum neighbour_kind)kind, i);
@@ -229,6 +245,8 @@ void plant_network_prepare_inputs(plant_t *p)
         fastest = fmax(fastest, air_sum * p->inverse_capacity[n]);
     if (plate)
         fastest = fmax(fastest, plate_sum * p->inverse_capacity[n + 1]);
+    if (to_holder > 0.0)
+        fastest = fmax(fastest, 2.0 * to_holder * p->inverse_capacity[holder_node(p, 0)]);
     /* The method is stable to 2.5 / eigenvalue; 1.5 damps well. */
     p->step_limit_s = fastest > 0.0 ? 1.5 / fastest : LONGEST_STEP_S;
     if (p->on[E_ambient_drift])

@@ -18,7 +18,7 @@ static void *take(unsigned char *memory, size_t *taken, size_t bytes)
  * Returns how many bytes that is. */
 static size_t lay_out(plant_t *p, unsigned char *memory)
 {
-    const size_t n = (size_t)p->n, nodes = (size_t)p->nodes;
+    const size_t n = (size_t)p->n, nodes = (size_t)holder_node(p, p->n); /* all, on or off */
     double **const of_springs[] = {
         &p->quantity,    &p->austenite,        &p->sensor_c,      &p->heat_start,
         &p->heat_from_c, &p->cool_start,       &p->cool_from_c,   &p->latent_j,
@@ -60,8 +60,7 @@ plant_t *plant_create_layers(int rows, int columns, int layers)
         layers < 1 || layers > PLANT_MAX_LAYERS || rows * columns > PLANT_MAX_SPRINGS / layers)
         return NULL;
     const int n = layers * rows * columns;
-    plant_t shape = {
-        .rows = rows, .columns = columns, .layers = layers, .n = n, .nodes = n + 1 + layers};
+    plant_t shape = {.rows = rows, .columns = columns, .layers = layers, .n = n};
     shape.bytes = lay_out(&shape, NULL);
     plant_t *p = calloc(1, shape.bytes);
     if (!p)
@@ -116,7 +115,7 @@ void plant_reset(plant_t *p)
     p->input_j = p->output_j = p->stored_j = 0.0;
     p->step_s = 1.0;
     const double ambient = plant_network_ambient(p, 0.0);
-    for (int i = 0; i < p->nodes; i++)
+    for (int i = 0; i < holder_node(p, p->n); i++)
         p->temperature_c[i] = ambient;
     for (int i = 0; i < p->n; i++) {
         p->sensor_c[i] = ambient;

@@ -59,9 +59,9 @@ typedef struct {
 /* One value for each spring, row by row, but for those that say how many they are. The values lie
  * behind the struct in its one piece of memory, as plant.c lays them out. */
 struct plant {
-    int rows, columns, layers, n;   /* rows of a layer; n of all layers */
-    int nodes;                      /* springs, air, a plate for each layer */
-    size_t bytes;                   /* of the whole piece */
+    int rows, columns, layers, n; /* rows of a layer; n of all layers */
+    int nodes;    /* springs, air, a plate for each layer; while that effect is on, their holders */
+    size_t bytes; /* of the whole piece */
     double *value[PARAMETER_COUNT]; /* one where the parameter is not per_spring */
     bool on[EFFECT_COUNT];
     plant_drive_mode_t *mode;
@@ -136,6 +136,12 @@ static inline int plate_node(const plant_t *p, int layer)
     return p->n + 1 + layer;
 }
 
+/* Of the holder behind spring i. The last ones: what has none need not step them. */
+static inline int holder_node(const plant_t *p, int i)
+{
+    return p->n + 1 + p->layers + i;
+}
+
 /* Row of the array, in whichever layer. */
 static inline int row_of(const plant_t *p, int i)
 {
@@ -199,6 +205,8 @@ void plant_electric_find(plant_t *p, const double *t, const double *austenite);
 
 void plant_network_lay(plant_t *p); /* who is whose neighbour: once */
 void plant_network_prepare(plant_t *p);
+/* Nodes that are off stand at ambient, so that switching one on starts it there. */
+void plant_network_rest(plant_t *p);
 /* Finds the longest stable step_limit_s too. */
 void plant_network_prepare_inputs(plant_t *p);
 double plant_network_ambient(const plant_t *p, double time_s);

@@ -107,11 +107,7 @@ plant_status_t plant_set_index(plant_t *p, size_t k, int spring, double value)
         p->value[k][spring] = value;
     if (k == P_ambient_c) {
         p->inputs_changed = true; /* need not rebuild the network at each row of a log */
-        const double ambient = plant_network_ambient(p, p->time_s);
-        if (!p->on[E_shared_air])
-            p->temperature_c[p->n] = ambient;
-        for (int layer = 0; layer < p->layers && !p->on[E_plate_conduction]; layer++)
-            p->temperature_c[plate_node(p, layer)] = ambient;
+        plant_network_rest(p);
     } else {
         p->parameters_changed = true;
     }

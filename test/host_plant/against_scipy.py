@@ -52,6 +52,8 @@ SCALARS = {
     "air_exchange_w_per_k": (0.05, 0.5),
     "plate_heat_capacity_j_per_k": (2, 30),
     "plate_loss_w_per_k": (0.01, 0.1),
+    "holder_heat_capacity_j_per_k": (0.1, 2),
+    "holder_coupling_w_per_k": (0, 6e-3),
     "wake_w_per_k": (0, 2e-3),
     "edge_loss_fraction": (0, 0.3),
     "edge_loss_fan_share": (0, 2),
@@ -92,7 +94,7 @@ M_F, M_S, A_S, A_F = 68.0, 78.0, 88.0, 98.0
 
 
 class Model:
-    """The equations of docs/physics.md in NumPy. State: springs, air, a plate for each layer, sensors (degC)."""
+    """The equations of docs/physics.md in NumPy. State: springs, air, a plate for each layer, sensors, holders (degC)."""
 
     def __init__(self, shape: tuple[int, int, int], values: dict, on: set, modes: np.ndarray) -> None:
         """Take random values, the effects that are on, and how each spring is driven."""
@@ -280,8 +282,8 @@ class Model:
         """Time derivative of the state."""
         fan = self.blown(commanded)
         n, v, on = self.n, self.v, self.on
-        sensors = n + 1 + self.layers
-        t, plate, sensor = y[:n], y[n + 1 : sensors], y[sensors:]
+        sensors, holders = n + 1 + self.layers, 2 * n + 1 + self.layers
+        t, plate, sensor, holder = y[:n], y[n + 1 : sensors], y[sensors:holders], y[holders:]
         ambient = self.ambient(time)
         air = y[n] if "shared_air" in on else ambient
         x, up, down = self.phase(t)
@@ -304,6 +306,9 @@ class Model:
             q = q - flow
             taken = flow @ self.of_layer - v["plate_loss_w_per_k"] * (plate - ambient)
             out[n + 1 : sensors] = taken / v["plate_heat_capacity_j_per_k"]
+        if "holder_mass" in on:
+            out[holders:] = v["holder_coupling_w_per_k"] * (t - holder) / v["holder_heat_capacity_j_per_k"]
+            q = q - v["holder_coupling_w_per_k"] * (t - holder)
         if "shared_air" in on:
             out[n] = (given.sum() - v["air_exchange_w_per_k"] * (air - ambient)) / v["air_heat_capacity_j_per_k"]
         capacity = self.capacity
@@ -311,7 +316,7 @@ class Model:
             latent = v["latent_heat_j"] * self.heavier
             capacity = capacity + np.where(q > 0, latent * up, latent * v["latent_cooling_ratio"] * down)
         out[:n] = q / capacity
-        out[sensors:] = (t - sensor) / v["sensor_lag_s"]
+        out[sensors:holders] = (t - sensor) / v["sensor_lag_s"]
         return out
 
     def blurred(self, t: np.ndarray, ambient: float) -> np.ndarray:
@@ -329,7 +334,8 @@ class Model:
     def seen(self, time: float, y: np.ndarray) -> np.ndarray:
         """What the sensors show (n,), degC."""
         v, ambient = self.v, self.ambient(time)
-        t = y[self.n + 1 + self.layers :] if "sensor_lag" in self.on else y[: self.n]
+        sensors = self.n + 1 + self.layers
+        t = y[sensors : sensors + self.n] if "sensor_lag" in self.on else y[: self.n]
         if "optical_mixing" in self.on:
             t = self.blurred(t, ambient)
             b = v["optical_background"]
@@ -402,7 +408,7 @@ def compare(lib: ctypes.CDLL, seed: int) -> tuple[float, float, str]:
     lib.plant_destroy(plant)
 
     model = Model((layers, rows, columns), values, on, modes)
-    y = np.full(2 * n + 1 + layers, model.ambient(0.0))
+    y = np.full(3 * n + 1 + layers, model.ambient(0.0))
     phase_matters = bool(on & {"latent_heat", "resistance_phase", "resistance_temperature"})
     method = "RK45" if phase_matters else "Radau"  # RK45 takes the kinks of a transformation best
     worst = [0.0, 0.0]

@@ -530,6 +530,72 @@ TEST(a_contact_takes_voltage_and_keeps_its_heat)
     TEST_ASSERT_EQUAL_DOUBLE(plant_current_a(plant, 1), plant_current_a(plant, 0));
 }
 
+/* Which is why it has no loss of its own, and is looked for only where there are several springs.
+ */
+TEST(a_holder_that_loses_heat_shows_as_one_that_does_not)
+{
+    const double g = 4e-3, capacity = 0.8, loss = 3e-3, part = g / (g + loss);
+    plant_t *leaking = plant_create(1, 1), *tight = plant_create(1, 1);
+    OK(plant_set_effect(leaking, "plate_conduction",
+                        true)); /* of one spring: a holder that loses */
+    OK(plant_set(leaking, "plate_coupling_w_per_k", g));
+    OK(plant_set(leaking, "plate_heat_capacity_j_per_k", capacity));
+    OK(plant_set(leaking, "plate_loss_w_per_k", loss));
+    OK(plant_set_effect(tight, "holder_mass", true));
+    OK(plant_set(tight, "holder_coupling_w_per_k", g * part));
+    OK(plant_set(tight, "holder_heat_capacity_j_per_k", capacity * part * part));
+    double own_w_per_k;
+    OK(plant_get(tight, "loss_w_per_k", &own_w_per_k));
+    OK(plant_set(tight, "loss_w_per_k", own_w_per_k + loss * part));
+    for (int row = 0; row < 300; row++) {
+        const double power_w = row % 70 < 40 ? 0.4 : 0.0;
+        OK(plant_drive(leaking, 0, PLANT_DRIVE_POWER, power_w));
+        OK(plant_drive(tight, 0, PLANT_DRIVE_POWER, power_w));
+        OK(plant_step(leaking, 3.0));
+        OK(plant_step(tight, 3.0));
+        TEST_ASSERT_DOUBLE_WITHIN(0.01, plant_temperature_c(leaking, 0),
+                                  plant_temperature_c(tight, 0));
+    }
+    TEST_ASSERT_TRUE(plant_temperature_c(tight, 0) > 30.0);
+    TEST_ASSERT_TRUE(fabs(plant_energy_balance_j(tight)) < 1e-9 * plant_energy_input_j(tight));
+    plant_destroy(leaking);
+    plant_destroy(tight);
+}
+
+TEST(a_holder_that_is_switched_on_is_as_warm_as_the_room_is_by_then)
+{
+    uncouple();
+    OK(plant_set_ambient(plant, 35.0));
+    OK(plant_set_temperature(plant, 0, 35.0));
+    on("holder_mass");
+    OK(plant_step(plant, 50.0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 35.0, at(0));
+}
+
+/* Explicit steps go by the faster of both, or rest does not last: it grows to what a step may err.
+ */
+TEST(a_spring_and_a_holder_that_weighs_little_or_much_stay_at_rest)
+{
+    static const double capacity[] = {1e-2, 3.0}, coupling[] = {0.5, 5.0};
+    for (int k = 0; k < 2; k++) {
+        plant_t *one = plant_create(1, 1);
+        OK(plant_set_effect(one, "holder_mass", true));
+        OK(plant_set(one, "holder_heat_capacity_j_per_k", capacity[k]));
+        OK(plant_set(one, "holder_coupling_w_per_k", coupling[k]));
+        OK(plant_drive(one, 0, PLANT_DRIVE_POWER, 0.3));
+        OK(plant_settle(one, 1e5));
+        double loss_w_per_k;
+        OK(plant_get(one, "loss_w_per_k", &loss_w_per_k));
+        const double rest_c = plant_temperature_c(one, 0);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-3, 20.0 + 0.3 / loss_w_per_k, rest_c);
+        for (int later = 0; later < 500; later++) {
+            OK(plant_step(one, 11.0));
+            TEST_ASSERT_DOUBLE_WITHIN(1e-6, rest_c, plant_temperature_c(one, 0));
+        }
+        plant_destroy(one);
+    }
+}
+
 TEST(correlations_against_the_table)
 {
     /* Incropera and DeWitt, table A.4 */

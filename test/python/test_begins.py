@@ -12,6 +12,7 @@ from ninespring.io.logs import log_text, read_log
 from ninespring.io.logs.run import Run
 from ninespring.model import native
 from ninespring.model.models import Array, Model
+from ninespring.model.simulate import settles_s
 
 ROWS, ROOM_C, HELD_W = 900, 20.0, 0.35
 
@@ -44,8 +45,9 @@ def cooling(effects: dict[str, dict[str, float]]) -> tuple[Model, Run]:
                 "plate_loss_w_per_k": 0.02,
             }
         },
+        {"holder_mass": {"holder_coupling_w_per_k": 0.004, "holder_heat_capacity_j_per_k": 2.0}},
     ],
-    ids=["air", "plate"],
+    ids=["air", "plate", "holders"],
 )
 def test_what_is_around_springs_that_begin_hot_is_warm(around: dict[str, dict[str, float]]) -> None:
     model, run = cooling(around)
@@ -56,6 +58,15 @@ def test_what_is_around_springs_that_begin_hot_is_warm(around: dict[str, dict[st
     plant.start_from_measured(run.temperature_c[0])
     bare = plant.simulate(run.time_s, native.POWER, run.drive, run.fan, run.ambient_c)
     assert np.abs(run.temperature_c - bare).max() > 1.5
+
+
+def test_holders_keep_an_array_warm_for_as_long_as_they_hold_heat() -> None:
+    model = Model(Array(1, 2))
+    model.parameters = {"loss_w_per_k": 0.006}
+    plain_s = settles_s(prediction.plant_of(model), 2)
+    model.effects = ["holder_mass"]
+    model.parameters |= {"holder_heat_capacity_j_per_k": 0.6}
+    assert settles_s(prediction.plant_of(model), 2) == pytest.approx(plain_s + 0.6 / 0.006)
 
 
 def test_a_box_that_loses_next_to_nothing_is_as_warm_as_it_would_be_after_days() -> None:

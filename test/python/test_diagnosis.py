@@ -51,6 +51,7 @@ def test_what_a_fit_keeps_of_long_logs_is_bounded_by_readings(make_log) -> None:
         ("latent_heat", {"latent_heat_j": 8.0}, "iv"),
         ("sensor_lag", {"sensor_lag_s": 6.0}, "iv"),
         ("shared_air", {"air_heat_capacity_j_per_k": 4.0, "air_exchange_w_per_k": 0.1}, "iv"),
+        ("holder_mass", {"holder_coupling_w_per_k": 0.004, "holder_heat_capacity_j_per_k": 0.6}, "iv"),
         ("fan_wake", {"wake_w_per_k": 0.0015, "wake_direction": 1.0}, "iv"),
         ("spring_mismatch", {"loss_scale[4]": 1.3}, "iv"),
         ("resistance_phase", {"resistance_austenite_ohm": 0.24}, "i"),

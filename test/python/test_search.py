@@ -357,8 +357,12 @@ def test_only_what_the_log_could_show_is_a_candidate(make_log, tmp_path: Path) -
         "transformation_shift",
     }
     assert "resistance_phase" in names_of(Problem(Array(), [read_log(make_log("d.csv", columns="i"))]))
-    pair = names_of(Problem(Array(1, 2), [read_log(commanded(tmp_path / "u.csv", {}), 2)]))
-    assert "supply_sag" in pair and "edge_loss" not in pair
+    both = read_log(commanded(tmp_path / "u.csv", {}), 2)
+    pair = names_of(Problem(Array(1, 2), [both]))
+    assert {"supply_sag", "holder_mass"} <= pair and "edge_loss" not in pair
+    one = replace(both, drive=both.drive[:, :1], temperature_c=both.temperature_c[:, :1])
+    alone = names_of(Problem(Array(1, 1), [one]))
+    assert "plate_conduction" in alone and "holder_mass" not in alone, "of a spring alone both are the same"
 
 
 def test_every_probe_is_within_its_bounds_and_moves_what_is_seen(make_log, tmp_path: Path) -> None:

@@ -22,10 +22,10 @@ EACH = (
 HIDES_S = 20.0
 """Of what a spring does, thermometers show this much later at most, about."""
 
-AROUND = "shared_air", "plate_conduction"
+AROUND = "shared_air", "plate_conduction", "holder_mass"
 """Effects that keep heat around the springs."""
 WARM_K = 3.0
-"""A spring that begins so much above its room was driven before: air and plate are warm, too, as if it had been so warm for long."""
+"""A spring that begins so much above its room was driven before: air, plate and holders are warm, too, as if it had been so warm for long."""
 HOTTEST_C = 300.0
 """Above which nothing transforms any more, and no spring is held."""
 
@@ -39,7 +39,7 @@ def started(
 ) -> native.Plant:
     """Return the plant as it is where a log, or what follows a gap in it, begins.
 
-    Air and plate are in balance with springs that begin warm, or with the first inputs where a run begins warm and steady: nobody
+    Air, plate and holders are in balance with springs that begin warm, or with the first inputs where a run begins warm and steady: nobody
     saw what was before, but at ambient they were not.
     """
     if ambient is not None:
@@ -99,6 +99,8 @@ def settles_s(plant: native.Plant, springs: int) -> float:
         holds, loses = holds + plant.get("plate_heat_capacity_j_per_k"), loses + plant.get("plate_loss_w_per_k")
     if plant.has("shared_air"):
         holds += plant.get("air_heat_capacity_j_per_k")
+    if plant.has("holder_mass"):
+        holds += springs * plant.get("holder_heat_capacity_j_per_k")
     return holds / max(loses, 1e-9)
 
 
@@ -113,8 +115,8 @@ def simulate_run(
 
     Return what the sensors show, (rows, springs), degC; `trace`: true temperatures and austenite, (rows, springs, 2).
 
-    After a gap the springs start again from what was measured there; air and plate carry on.
-    Air and plate start as `started` says.
+    After a gap the springs start again from what was measured there; air, plate and holders carry on.
+    Those start as `started` says.
     """
     along = _Along(plant, run, ambient, trace)
     along.lay_load(0)
