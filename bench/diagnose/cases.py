@@ -80,6 +80,11 @@ def effect_numbers(name: str, rng: np.random.Generator) -> dict[str, float]:
         "sensor_lag": lambda: {"tau_s": u(1.5, 12.0)},
         "sensor_gain": lambda: {"gain": 1 + u(0.03, 0.08) * (1 if either else -1)},
         "optical_mixing": lambda: {"fraction": u(0.01, 0.05)},
+        "holder_mass": lambda: {
+            "coupling": u(1.5e-3, 6e-3),
+            "capacity": u(0.15, 1.0),
+            "loss": u(0.2e-3, 1.5e-3),
+        },
         "loose_contact": lambda: {
             "spring": a,
             "period_s": u(90.0, 240.0),

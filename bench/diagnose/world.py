@@ -32,6 +32,7 @@ EFFECTS = (
     "sensor_lag",
     "sensor_gain",
     "optical_mixing",
+    "holder_mass",
 )
 OUTSIDE = {
     "loose_contact": "electrics: one spring's contact goes bad now and then, its heat falls by a part",
@@ -127,6 +128,7 @@ def simulate(world: World, runs: list[Inputs]) -> dict[str, np.ndarray]:
         r_austenite = r_martensite
     air_on = effect.get("shared_air")
     plate_on = effect.get("plate_conduction")
+    holders_on = effect.get("holder_mass")
     latent = effect.get("latent_heat", {"joule": 0.0})["joule"]
     # an alloy that is not as declared: degC by which it transforms elsewhere, K of further hysteresis
     elsewhere = effect.get("_alloy", {}).get("shift", 0.0)
@@ -140,6 +142,7 @@ def simulate(world: World, runs: list[Inputs]) -> dict[str, np.ndarray]:
     temperature = np.repeat(ambient[:, :1], SPRINGS, axis=1).copy()
     air = ambient[:, 0].copy()
     plate = ambient[:, 0].copy()
+    holder = temperature.copy()
     delayed = np.zeros((count, SPRINGS))
     phase = np.zeros((count, SPRINGS))
     out = {key: np.zeros((count, rows, SPRINGS)) for key in ("temperature", "current", "voltage")}
@@ -187,8 +190,8 @@ def simulate(world: World, runs: list[Inputs]) -> dict[str, np.ndarray]:
         h = span / steps
 
         def rates(
-            t: np.ndarray, a: np.ndarray, p: np.ndarray, d: np.ndarray, xi: np.ndarray
-        ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+            t: np.ndarray, a: np.ndarray, p: np.ndarray, b: np.ndarray, d: np.ndarray, xi: np.ndarray
+        ) -> tuple[np.ndarray, ...]:
             around = a[:, None] if air_on else surroundings[:, None]
             over = t - around
             lost = loss * over
@@ -240,18 +243,24 @@ def simulate(world: World, runs: list[Inputs]) -> dict[str, np.ndarray]:
                 into = plate_on["coupling"] * (t - p[:, None])
                 flow = flow - into
                 rate_p = (into.sum(axis=1) - plate_on["loss"] * (p - surroundings)) / (plate_on["capacity"])
+            rate_b = np.zeros_like(b)
+            if holders_on:
+                # a holder loses heat itself, too, which the product's does not
+                behind = holders_on["coupling"] * (t - b)
+                flow = flow - behind
+                rate_b = (behind - holders_on["loss"] * (b - surroundings[:, None])) / holders_on["capacity"]
             per_kelvin = duhem(t, flow > 0, xi)
             rate_t = flow / (capacity + latent * per_kelvin)
-            return rate_t, rate_a, rate_p, rate_d, per_kelvin * rate_t
+            return rate_t, rate_a, rate_p, rate_b, rate_d, per_kelvin * rate_t
 
         mode_command = bool(effect.get("_command"))
         for _ in range(steps):
-            state = (temperature, air, plate, delayed, phase)
+            state = (temperature, air, plate, holder, delayed, phase)
             k1 = rates(*state)
             k2 = rates(*(s + 0.5 * h * k for s, k in zip(state, k1, strict=True)))
             k3 = rates(*(s + 0.5 * h * k for s, k in zip(state, k2, strict=True)))
             k4 = rates(*(s + h * k for s, k in zip(state, k3, strict=True)))
-            temperature, air, plate, delayed, phase = (
+            temperature, air, plate, holder, delayed, phase = (
                 s + h / 6 * (a + 2 * b + 2 * c + d) for s, a, b, c, d in zip(state, k1, k2, k3, k4, strict=True)
             )
             phase = np.clip(phase, 0.0, 1.0)
