@@ -425,9 +425,12 @@ def test_a_drift_that_follows_anything_must_win_clearly(plain: search.Search) ->
     assert plain.preferred(drift, ramp) and not plain.preferred(ramp, drift)
 
 
-def test_slow_nodes_are_tried_in_the_place_of_a_drift_whatever_the_forecast_says(plain: search.Search) -> None:
-    drift = with_effect(plain, "ambient_drift", "free")
-    tried = {other.spec.effects[-1] for _, other in plain.rivals(drift, {"ambient_drift": plain.base})}
+@pytest.mark.parametrize(("effect", "variant"), [("ambient_drift", "free"), ("holder_mass", "")])
+def test_slow_nodes_are_tried_in_the_place_of_what_follows_anything_slow_whatever_the_forecast_says(
+    plain: search.Search, effect: str, variant: str
+) -> None:
+    bends = with_effect(plain, effect, variant)
+    tried = {other.spec.effects[-1] for _, other in plain.rivals(bends, {effect: plain.base})}
     assert {"shared_air", "plate_conduction"} <= tried
 
 

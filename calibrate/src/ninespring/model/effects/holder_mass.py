@@ -23,6 +23,7 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         (heat, coupling),
         ({HEAT: 2.0 * own, COUPLING: 0.5 * loss}, {HEAT: 0.5 * own, COUPLING: loss}),
         more_starts=({HEAT: 2.0 * own, COUPLING: loss},),
+        flexible=True,  # a temperature for each spring that nobody sees: what one for all of them explains is that
     )
 
 
