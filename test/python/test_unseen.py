@@ -333,8 +333,9 @@ def test_numbers_that_foretell_worse_beside_what_is_of_that_day_are_given_as_the
     )
     monkeypatch.setattr(diagnosis, "_finish", lambda problem, fit: fit)
     case: Any = SimpleNamespace(problem=told.problem, final=found, hidden=[], carried=None, plain=None)
-    diagnosis._foretold(case, SimpleNamespace(reduced=without), told)  # type: ignore[arg-type]
+    headline = diagnosis._foretold(case, SimpleNamespace(reduced=without), told)  # type: ignore[arg-type]
     assert case.final is found, "what was found is told"
+    assert headline is not None and headline.rmse_c == (1.0 if dropped else beside_k), "of the model that is given"
     assert (case.carried is not None) == dropped
 
 

@@ -572,7 +572,7 @@ def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> re
     carried = judged_by.carried(case.final, judge.reduced)
     given = judged_by.given(case.final, carried)
     case.carried = None if given is case.final else _finish(problem, given)
-    return _given(case, judged_by, carried)
+    return _given(case, judged_by, given)
 
 
 def _by_least_squares(case: _Case) -> search.Search:
