@@ -289,11 +289,14 @@ class _Case:
     hidden: list[unnamed.Hidden]
     fits: Mapping[Any, Fit]
     """By least squares, of the first search."""
+    first: Fit | None
+    """What that found, where only what is alike was looked for and something is left."""
     witnesses: dict[str, Witness] = field(default_factory=dict)
     not_kept: list[str] = field(default_factory=list)
     """Effects that foretell a run no better, in words."""
-    plain: bool = False
-    """The model that is given is the better baseline: it foretells better than what was found, whose names stay."""
+    instead: bool = False
+    """Another model is given, which foretells better than what was found, whose names stay: the better baseline, or what least squares
+    found first."""
     carried: Fit | None = None
     """What is given in place of the final fit where that foretells worse: without what is of that day."""
 
@@ -347,8 +350,9 @@ def _diagnose(
         case.final = replace(case.final, jacobian=slopes)
     heat = unknown_heat.find(problem, case.final, progress)
     final, given = case.final, case.carried or case.final
-    if case.plain:
-        given = _finish(problem, judged_by.refitted(search.Search(problem, case.search.candidates, case.declared)))
+    if case.instead:
+        again = search.Search(problem, case.search.candidates, case.declared)
+        given = _finish(problem, judged_by.refitted(again, judged_by.instead))
     told = results.Diagnosis(
         logs=[results.Read(file=Path(r.name).name, sha256=r.sha256, rows=len(r.time_s)) for r in runs],
         baseline=baseline,
@@ -383,7 +387,8 @@ def _foretelling(
     """Search by what has a name and is the same in all runs; where that leaves something, by all there is.
 
     What is of one day bends as it likes: it is the better account only where a run that was left out is not foretold better
-    without it. (A cause without a name is in no model: what it leaves in such a run speaks for no stand-in.)
+    without it. (A cause without a name is in no model: what it leaves in such a run speaks for no stand-in.) Beside either, what
+    least squares found first may foretell best: a model it may be, without naming anything.
     """
 
     def prepared() -> Problem:
@@ -408,7 +413,9 @@ def _foretelling(
     found = account(False, same[0].fits)
     # what bent may have been dropped since, and nothing be left in its place
     instead = set(same[0].adopted) - set(found[0].adopted) if not found[0].hidden else ()
-    return same if instead and _off(*same) * unseen.WORSE < _off(*found) else found
+    taken = same if instead and _off(*same) * unseen.WORSE < _off(*found) else found
+    taken[2].unjudged = same[0].first
+    return taken
 
 
 def _rested(plain: _Case, prepared: Callable[[], Problem]) -> _Account | None:
@@ -427,7 +434,9 @@ def _rested(plain: _Case, prepared: Callable[[], Problem]) -> _Account | None:
         return None
     found, final, without = searched
     final = _finish(problem, final)
-    case = _Case(problem, plain.progress, found, first.base, found.base, final, without, [], plain.swapped, [], {})
+    case = _Case(
+        problem, plain.progress, found, first.base, found.base, final, without, [], plain.swapped, [], {}, None
+    )
     case.witnesses = {effect: witness(problem, final, effect, other, False) for effect, other in without.items()}
     return case, found, judged_by
 
@@ -483,6 +492,8 @@ def _searched(
         final, without, contenders = found.run()
         fits = {}
     problem.learn_power(final.spec, final.values)
+    # at its minimum: what a part of the runs hardly shows stays there
+    first = _finish(problem, final) if alike and not swapped and unexplained(problem, final) else None
     hidden: list[unnamed.Hidden] = []
     if not swapped and unexplained(problem, final):
         found, (final, without, contenders) = _springs_apart(problem, found, (final, without, contenders))
@@ -496,7 +507,7 @@ def _searched(
         final, without, contenders = found.settle(found.forward(final), grow=False)
     progress("held-out blocks")
     final = _finish(problem, final)
-    return _Case(problem, progress, found, base, found.base, final, without, contenders, swapped, hidden, fits)
+    return _Case(problem, progress, found, base, found.base, final, without, contenders, swapped, hidden, fits, first)
 
 
 def _judged(case: _Case, judged_by: unseen.Unseen) -> search.Search:
@@ -557,18 +568,19 @@ def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> re
         problem.take_for(None)
         case.base = case.declared
         case.search = judge = search.Search(problem, case.search.candidates, case.base, case.progress)
-        kept, case.contenders = judged_by.refitted(judge), []
+        kept, case.contenders = judged_by.refitted(judge, judged_by.plain), []
         why = "nothing else that was tried predicts as well"
         # a lag that foretells better is in the model; a name it is where it explains what a name must
-        case.plain = kept is not case.base and not judge.worth(kept, case.base)
-        kept = case.base if case.plain else kept
+        named = kept is case.base or judge.worth(kept, case.base)
+        case.instead = not named or judged_by.instead is not judged_by.plain
+        kept = kept if named else case.base
     if case.not_kept or why:
         case.final = _finish(problem, kept)
         case.without = {effect: judge.reduced(case.final, effect) for effect in case.adopted}
         for effect, without in case.without.items():
             case.witnesses.setdefault(effect, witness(problem, case.final, effect, without, False))
     if why:
-        return judged_by.told(judged_by.plain, why)
+        return judged_by.told(judged_by.instead, why)
     carried = judged_by.carried(case.final, judge.reduced)
     given = judged_by.given(case.final, carried)
     case.carried = None if given is case.final else _finish(problem, given)
@@ -596,12 +608,12 @@ def _by_least_squares(case: _Case) -> search.Search:
 
 
 def _given(case: _Case, judged_by: unseen.Unseen, fit: Fit) -> results.Unseen | None:
-    """Return how well a run is foretold by what was found or, where that foretells worse, by the better baseline."""
-    case.plain = judged_by.worse(fit) or judged_by.given_worse(fit)
-    if not case.plain:
+    """Return how well a run is foretold by what was found or, where that foretells worse, by what is given instead."""
+    case.instead = judged_by.worse(fit) or judged_by.given_worse(fit)
+    if not case.instead:
         return judged_by.told(fit)
     why = f"with what was found it would be {judged_by.foretells(fit, judged_by.problem.colour):.2f} K"
-    return judged_by.told(judged_by.plain, why)
+    return judged_by.told(judged_by.instead, why)
 
 
 def _with_what_has_no_name(case: _Case, steps: list[tuple[str, Fit]]) -> list[tuple[str, Fit]]:

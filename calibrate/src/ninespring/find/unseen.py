@@ -185,6 +185,8 @@ class Unseen:
     problem: Problem
     found: Search
     base: Fit
+    unjudged: Fit | None = None
+    """What least squares found that is the same in all runs, where that leaves something: as names unsure, it may foretell them."""
 
     def __post_init__(self) -> None:
         self.splits = splits(self.problem)
@@ -225,18 +227,27 @@ class Unseen:
 
     @property
     def plain(self) -> Fit:
-        """What is given where nothing that was found foretells as well: the declared model, with a lag where that is worth it in runs
-        left out, each in the room that its first minute tells: so it will be used."""
-        return self.lagged if self.foretells(self.lagged) <= self.foretells(self.base) / WORSE else self.base
+        """What is given where nothing else foretells as well: the declared model, with a lag where that is worth it in runs left
+        out, each in the room that its first minute tells: so it will be used."""
+        return self._rather(self.lagged, self.base)
+
+    @property
+    def instead(self) -> Fit:
+        """What is given in place of what foretells worse: the plain model, or what least squares found where that foretells better,
+        which is all that it is judged by."""
+        return self._rather(self.unjudged or self.base, self.plain)
+
+    def _rather(self, one: Fit, other: Fit) -> Fit:
+        return one if self.foretells(one) <= self.foretells(other) / WORSE else other
 
     def worse(self, fit: Fit) -> bool:
         """Return whether something foretells the unseen worse than the better of both baselines."""
         return self.own(fit) > WORSE * self.rmse(self.better)
 
     def given_worse(self, fit: Fit) -> bool:
-        """Return whether runs left out, each in the room that its first minute tells, are foretold worse than by the plain model: a
-        model is given to predict such runs."""
-        return self.foretells(fit, self.problem.colour) > WORSE * self.foretells(self.plain)
+        """Return whether runs left out, each in the room that its first minute tells, are foretold worse than by what is given instead:
+        a model is given to predict such runs."""
+        return self.foretells(fit, self.problem.colour) > WORSE * self.foretells(self.instead)
 
     def tells(self, fit: Fit, without: Fit) -> bool:
         """Return whether most of what is off in the unseen without an effect is foretold with it: no stand-in does that. Or, in runs
@@ -306,11 +317,14 @@ class Unseen:
             fit = reduced(fit, out)
         return fit, said
 
-    def refitted(self, found: Search) -> Fit:
-        """Return the plain model fitted to everything, by least squares as anybody fits it, in a search that begins at the declared."""
-        if self.lag is None or self.plain is self.base:
+    def refitted(self, found: Search, model: Fit) -> Fit:
+        """Return one of these models fitted to everything, by least squares as anybody fits it, in a search that begins at the
+        declared."""
+        if model is self.base:
             return found.base
-        return found.refit(found.base, [self.lag], [1.0])
+        if self.lag is not None and model is self.lagged:
+            return found.refit(found.base, [self.lag], [1.0])
+        return found.problem.fit(model.spec, model.as_dict(), tolerance=1e-3)
 
     def _left_out(self, effect: str, fit: Fit, other: Fit) -> str:
         return (
@@ -324,7 +338,7 @@ class Unseen:
         return "the last part of the run (a half and a third of it)" if alone else "a run that the fit did not see"
 
     def told(self, fit: Fit, why: str = "") -> results.Unseen | None:
-        """Return what diagnosis.json says of the model that is given, None where nothing can be left out; `why` it is the plain one."""
+        """Return what diagnosis.json says of the model that is given, None where nothing can be left out; `why` it is given instead."""
         mine = self.foretells(fit, None if why else self.problem.colour)
         if not math.isfinite(mine):
             return None
@@ -335,9 +349,12 @@ class Unseen:
             declared_rmse_c=declared,
             with_lag_rmse_c=lagged,
             text=f"{self._what} is predicted to {mine:.2f} K (declared model, fitted: {declared:.2f}, with a lag: {lagged:.2f})"
-            + (
-                f". The model is the declared model{WITH_LAG * (self.plain is not self.base)}, by least squares: {why}"
-                if why
-                else ""
-            ),
+            + (f". The model is the declared model{self._with(fit)}, by least squares: {why}" if why else ""),
         )
+
+    def _with(self, model: Fit) -> str:
+        """Return what a model that is given instead has beside the declared one, in words."""
+        if model is self.base or model is self.lagged:
+            return WITH_LAG * (model is not self.base)
+        names = [e for e in model.spec.effects if e not in self.base.spec.effects]
+        return f" with {' and '.join(names)}, each named or not"
