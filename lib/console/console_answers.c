@@ -203,8 +203,8 @@ static void add_source(text_line_t *line, const controller_t *controller)
 {
     const circuit_source_t *const source = controller_source(controller);
     const current_control_parameters_t *const declared = &controller->current.parameters;
-    const int32_t values[] = {rounded(0.1f * source->supply_mv), rounded(0.1f * source->drop_mv),
-                              rounded(0.05f * source->unsure_mv),
+    const int32_t values[] = {rounded(0.1f * circuit_source_supply_mv(source)),
+                              rounded(0.1f * source->drop_mv), rounded(0.05f * source->unsure_mv),
                               rounded(0.1f * (float)declared->supply_mv),
                               rounded(0.1f * (float)declared->freewheel_mv)};
     text_add_values(line, FLASH_TEXT("found: supply #2 V, diodes #2 V +-#2; declared: #2 V, #2 V"),

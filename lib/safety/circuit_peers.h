@@ -23,7 +23,7 @@ extern "C" {
 #endif
 #endif
 
-#define CIRCUIT_PEERS_LEAST   3u /* others: one that lies is outvoted */
+#define CIRCUIT_PEERS_LEAST   3u /* others: one that lies is outvoted, whatever they show */
 #define CIRCUIT_PEERS_WINDOWS 3u /* on end */
 
 /* Shares: voltage found behind a switch, of the voltage that its duty should bring. */
@@ -35,6 +35,7 @@ typedef struct {
     uint8_t share_q7;      /* of the last window, over its own share; 0: it told nothing */
     uint8_t shown_16mv;    /* the voltage that should have been there then */
     uint8_t was_q7;        /* of one before the last, that was not odd; 0: none was */
+    uint8_t was_16mv;      /* the voltage that should have been there then */
     uint8_t learnt;        /* windows that its own share is the mean of; at its most it stays */
 } circuit_peer_t;
 
@@ -47,17 +48,23 @@ typedef struct {
  * was found is off from the expected one, times the middle share of the other springs that are
  * driven and times its own share of theirs, by more than 5 % and what offsets make: at the least of
  * the voltages at which the two were read and its own share was learnt. As long as its own share is
- * not known, by 18 % (its wiring, its gains); where fewer than CIRCUIT_PEERS_LEAST others are
- * driven, from what it showed before by 20 % (its supply may move), but by 5 % once it was found
- * and cleared; that is the window before the last at about the same volts, as in the last one
- * another share may begin, and none that is off by more than those 20 %, though offsets may be
- * that. What is not known of the drop teaches no share as far as volts differ, more where less of
- * them is found, and is let pass, and acquits nobody who was found; nor does a window that only
- * offsets explain. Its own share is the mean, by volts, of the first 255 windows that are not odd
- * and in which offsets make less than those 18 %, and stays: so a drift is found, however slow. The
- * others count each over its own share: a set that changes moves nothing. A window that tells
- * nothing, or of less than 0.1 V, is no witness for the others, and changes nothing else. springs
- * at most CIRCUIT_PEERS_MAX, spring below springs. */
+ * not known, by 18 % (its wiring, its gains).
+ * It takes CIRCUIT_PEERS_LEAST others to outvote one that lies, or two that agree if its own share
+ * is known. Beside fewer, the one at most volts is what a supply that moves is told by: a spring
+ * that shows as much beside it as ever is acquitted; one that does not is odd if it has changed
+ * itself, by 5 %, from what it showed before. Where nobody tells, the least that is odd is 10 % less
+ * or 20 % more (its supply may move, and one that shows more makes its spring colder), and 5 % once
+ * it was found and cleared. What it showed before is the window before the last at about the same
+ * volts, as in the last one another share may begin, and none that is off by more than those, though
+ * offsets may be that; offsets make of it what they make of other volts, and noise 8 mV.
+ * What is not known of the drop teaches no share as far as volts differ, more where less of them is
+ * found, and is let pass, and acquits nobody who was found; nor does a window that only offsets
+ * explain. Its own share is the mean, by volts, of the first 255 windows that are not odd and in
+ * which offsets make less than those 18 %, and stays: so a drift is found, however slow. Of the
+ * first two it is what they show beside the mean of both. The others count each over its own share:
+ * a set that changes moves nothing. A window that tells nothing, or of less than 0.1 V, is no
+ * witness for the others, and changes nothing else. springs at most CIRCUIT_PEERS_MAX, spring below
+ * springs. */
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t spring,
                          const circuit_window_t *window, const circuit_source_t *source);
 

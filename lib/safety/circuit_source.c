@@ -82,19 +82,25 @@ static bool believe(circuit_source_t *s, const current_control_parameters_t *p)
         is_near(level_mv, s->step_mv * mean - s->drop_mv, LEAST_LEVEL_MV + LEVEL_PART * s->mean_mv);
     if (!stays) {
         s->drop_mv = found_drop_mv;
-        s->supply_mv = found_mv;
+        s->step_mv = found_step_mv;
     }
-    s->step_mv = (1.0f / DUTY_STEPS) * (s->supply_mv + s->drop_mv);
     s->less_mv = up_to(s->unsure_mv, s->drop_mv - least_mv);
     s->more_mv = up_to(s->unsure_mv, most_mv - s->drop_mv);
     s->dead_steps = (uint16_t)up_to(DUTY_STEPS, (s->drop_mv + s->more_mv) / s->step_mv);
     return !stays;
 }
 
+float circuit_source_supply_mv(const circuit_source_t *source)
+{
+    return DUTY_STEPS * source->step_mv - source->drop_mv;
+}
+
 void circuit_source_begin(circuit_source_t *source, const current_control_parameters_t *circuit)
 {
-    *source = (circuit_source_t){.supply_mv = (float)circuit->supply_mv,
-                                 .drop_mv = (float)circuit->freewheel_mv};
+    *source =
+        (circuit_source_t){.drop_mv = (float)circuit->freewheel_mv,
+                           .step_mv = (1.0f / DUTY_STEPS) *
+                                      (float)((int32_t)circuit->supply_mv + circuit->freewheel_mv)};
     (void)believe(source, circuit);
 }
 

@@ -25,9 +25,8 @@ extern "C" {
 
 typedef struct {
     /* what is believed */
-    float supply_mv;
     float drop_mv;
-    float step_mv;   /* of voltage behind a switch, for a step of duty */
+    float step_mv;   /* of voltage behind a switch, for a step of duty: supply and drop are 800 */
     float unsure_mv; /* the drop may be so far from that: two deviations */
     float less_mv;   /* and within its tolerance: so much less, so much more */
     float more_mv;
@@ -44,6 +43,9 @@ typedef struct {
     float duty_square; /* sums, of how duty and voltage moved from round to round */
     float duty_mv;
 } circuit_source_t;
+
+/* mV. */
+float circuit_source_supply_mv(const circuit_source_t *source);
 
 /* What is declared is believed. */
 void circuit_source_begin(circuit_source_t *source, const current_control_parameters_t *circuit);

@@ -703,8 +703,8 @@ TEST(what_feeds_the_springs_is_told_as_it_was_found)
         "\r\nfound: supply 4.86 V, diodes 0.38 V +-0.03; declared: 5.25 V, 0.30 V\r\nok\r\n";
     expect_ok("$supply_v=5.25");
     expect_ok("$freewheel_v=0.3");
-    controller.source.supply_mv = 4856.0f;
     controller.source.drop_mv = 384.0f;
+    controller.source.step_mv = (4856.0f + 384.0f) / 800.0f;
     controller.source.unsure_mv = 62.0f;
     ask_at_once("model");
     expect_said(wanted);

@@ -129,7 +129,7 @@ TEST(what_is_no_circuit_teaches_nothing_of_the_supply)
         TEST_ASSERT_TRUE(controller_set_target(&controller, 4, 1000));
         run(200);
         const circuit_source_t *const source = controller_source(&controller);
-        TEST_ASSERT_EQUAL(wrong == 0, source->supply_mv > 5100.0f);
+        TEST_ASSERT_EQUAL(wrong == 0, circuit_source_supply_mv(source) > 5100.0f);
         TEST_ASSERT_EQUAL(wrong != 0, source->before < 0.5f);
         TEST_ASSERT_EQUAL(wrong != 0 ? SAFETY_FAULT_SENSOR_MISMATCH : SAFETY_FAULT_NONE,
                           controller_fault(&controller, 4));
