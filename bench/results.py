@@ -84,6 +84,11 @@ SECTIONS: tuple[Section, ...] = (
         "The board in everything at once",
         f"{HOST}/bench/swarm/bench_swarm --runs 3066 --seed 7406000 --resume build/results/board_swarm.txt",
     ),
+    Section(
+        "lies",
+        "A sensor that begins to lie, or a supply that moves",
+        f"{PYTHON} bench/lies/lies.py --runs 4000 --seed 7101",
+    ),
     Section("flips", "Bits that turn over", f"{HOST}/bench/swarm/bench_flips --runs 50 --boards 40 --seed 8001"),
     Section("mutate", "What the tests notice", "script/mutate"),
     Section("replay", "Measured logs through the on-chip model", f"{PYTHON} script/replay_fit.py"),
@@ -263,6 +268,9 @@ HEADLINES: tuple[tuple[str, tuple[tuple[str, str, str], ...]], ...] = (
         (
             ("lives in which something that must hold was broken", "board_swarm", "lives in which"),
             ("... over simulated hours", "board_swarm", "simulated hours"),
+            ("a sensor begins to show less: above 120 degC", "lies", "a sensor begins to lie"),
+            ("... and nothing said", "lies", "... and nothing said"),
+            ("sound sensors, a supply that moves: a fault", "lies", "sound sensors"),
             ("bits turned over, RAM and registers", "flips", "flips"),
             ("... that leave a spring hotter by 10 K unsaid", "flips", "... that leave"),
         ),

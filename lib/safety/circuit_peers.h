@@ -52,11 +52,11 @@ typedef struct {
  * It takes CIRCUIT_PEERS_LEAST others to outvote one that lies, or two that agree if its own share
  * is known. Beside fewer, the one at most volts is what a supply that moves is told by: a spring
  * that shows as much beside it as ever is acquitted; one that does not is odd if it has changed
- * itself, by 5 %, from what it showed before. Where nobody tells, the least that is odd is 10 % less
- * or 20 % more (its supply may move, and one that shows more makes its spring colder), and 5 % once
- * it was found and cleared. What it showed before is the window before the last at about the same
- * volts, as in the last one another share may begin, and none that is off by more than those, though
- * offsets may be that; offsets make of it what they make of other volts, and noise 8 mV.
+ * itself, by 5 %, from what it showed before. Where nobody tells, the least that is odd is 10 %
+ * less or 20 % more (its supply may move, and one that shows more makes its spring colder), and 5 %
+ * once it was found and cleared. What it showed before is the window before the last at about the
+ * same volts, as in the last one another share may begin, and none that is off by more than those,
+ * though offsets may be that; offsets make of it what they make of other volts, and noise 8 mV.
  * What is not known of the drop teaches no share as far as volts differ, more where less of them is
  * found, and is let pass, and acquits nobody who was found; nor does a window that only offsets
  * explain. Its own share is the mean, by volts, of the first 255 windows that are not odd and in

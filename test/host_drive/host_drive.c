@@ -237,8 +237,8 @@ TEST(a_sensor_that_shows_a_fifth_too_little_overheats_nothing)
     TEST_ASSERT_TRUE(run(300.0) < HOTTEST_C);
 }
 
-/* Its one converter's reference fails, so that both of what it reads fall: a supply that falls reads
- * alike, and with so few others nobody outvotes it (142 to 178 degC, nothing said). */
+/* Its one converter's reference fails, so that both of what it reads fall: a supply that falls
+ * reads alike, and with so few others nobody outvotes it (142 to 178 degC, nothing said). */
 TEST(a_sensor_of_which_both_readings_fall_in_a_hold_is_told_from_a_supply_that_falls)
 {
     static const double lies[][2] = {{0.82, 0.80}, {0.86, 0.84}, {0.75, 0.77}};
