@@ -608,14 +608,14 @@ TEST(who_is_suspected_is_found_in_one_window_after_a_clear)
         const uint8_t driven = n < 2 ? SPRINGS : 1;
         setUp();
         TEST_ASSERT_EQUAL_HEX(0, rounds(5, driven, HEATS_MV, 1.0f, 1.0f));
-        TEST_ASSERT_EQUAL_HEX(0, rounds(2, driven, HEATS_MV, 0.9f, 1.0f));
+        TEST_ASSERT_EQUAL_HEX(0, rounds(2, driven, HEATS_MV, 0.92f, 1.0f));
         for (unsigned times = 0; times < 10; times++) {
             circuit_peers_suspect(&peers, 0, times == 0 ? 4096 : 2048); /* once is enough */
-            TEST_ASSERT_EQUAL_HEX(1, rounds(1, driven, HEATS_MV, 0.9f, 1.0f));
+            TEST_ASSERT_EQUAL_HEX(1, rounds(1, driven, HEATS_MV, 0.92f, 1.0f));
         }
         circuit_peers_clear(&peers, 0, true);
         TEST_ASSERT_EQUAL_HEX(0, honest ? rounds(1, driven, HEATS_MV, 1.0f, 1.0f) : 0);
-        TEST_ASSERT_EQUAL_HEX(!honest, rounds(1, driven, HEATS_MV, 0.9f, 1.0f));
+        TEST_ASSERT_EQUAL_HEX(!honest, rounds(1, driven, HEATS_MV, 0.92f, 1.0f));
     }
 }
 
@@ -725,6 +725,35 @@ TEST(offsets_make_nothing_of_a_share_at_the_same_volts)
     TEST_ASSERT_EQUAL_HEX(0, rounds(2, 1, HEATS_MV, 1.0f, 0.0f));
     TEST_ASSERT_EQUAL_HEX(0, rounds(3, 1, HOLDS_MV, 1.0f, 0.0f));
     TEST_ASSERT_EQUAL_HEX(1, rounds(3, 1, HOLDS_MV, 0.87f, 0.0f));
+}
+
+/* Of two that do not agree: whichever shows less. */
+TEST(the_one_at_most_volts_tells_a_supply_that_moves)
+{
+    for (unsigned n = 0; n < 4; n++) {
+        setUp();
+        TEST_ASSERT_EQUAL_HEX(0, rounds(8, 3, HEATS_MV, 1.0f, 1.0f));
+        const uint8_t at_most = n % 2u != 0 ? 1 : 2, at_few = at_most == 1 ? 2 : 1;
+        for (unsigned window = 0; window < 6; window++) {
+            TEST_ASSERT_FALSE(takes(at_most, HEATS_MV, 0.85f));
+            TEST_ASSERT_FALSE(takes(at_few, 110.0f, n < 2 ? 0.75f : 1.0f));
+            TEST_ASSERT_FALSE(takes(0, HEATS_MV, 0.85f));
+        }
+    }
+}
+
+/* Half of the difference to each of two; beside those that outvote it, all of it. */
+TEST(what_two_learn_of_each_other_stays)
+{
+    TEST_ASSERT_EQUAL_HEX(0, rounds(30, 2, HEATS_MV, 0.9f, 1.0f));
+    const float first = (float)peers.spring[0].own_q12, second = (float)peers.spring[1].own_q12;
+    TEST_ASSERT_FLOAT_WITHIN(0.01f, 0.9f, first / second);
+    TEST_ASSERT_FLOAT_WITHIN(0.01f, 1.0f, first / 4096.0f / 0.947f);
+    setUp();
+    for (uint8_t k = 0; k < 4; k++) {
+        TEST_ASSERT_FALSE(takes(k, HEATS_MV, k == 3 ? 0.9f : 1.0f));
+    }
+    TEST_ASSERT_INT_WITHIN(8, 3686, peers.spring[3].own_q12);
 }
 
 /* Of 110 mV offsets make a quarter: it agrees with whatever this one shows. */
