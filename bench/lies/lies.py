@@ -89,11 +89,10 @@ def outcome(sim: Path, folder: Path, seed: int, run: int, lies: bool) -> dict[st
     }
 
 
-def share(figure: str, count: int, of: int, target: str, command: str) -> dict[str, Any]:
-    """Return a row: per cent of the runs, with its interval of 95 % (Wilson)."""
+def share(figure: str, count: int, of: int) -> tuple[str, float, str]:
+    """Return a figure: per cent of the runs, with its interval of 95 % (Wilson)."""
     between = binomtest(count, of).proportion_ci(method="wilson")
-    name = f"{figure}, of {of} (95 %: {100 * between.low:.1f} to {100 * between.high:.1f} %)"
-    return {"figure": name, "value": 100 * count / of, "unit": "%", "target": target, "command": command}
+    return f"{figure}, of {of} (95 %: {100 * between.low:.1f} to {100 * between.high:.1f} %)", 100 * count / of, "%"
 
 
 def main() -> int:
@@ -120,19 +119,13 @@ def main() -> int:
         if options.verbose:
             for lies, run in [(True, run) for run in hot] + [(False, run) for run in blamed]:
                 print(json.dumps(run), drawn(options.seed, run["run"], lies), sep="\n")
-    unsaid = sum(not run["faults"] for run in hot)
-    rows = [
-        share("a sensor begins to lie: above 120 degC", len(hot), half, "", command),
-        share("... and nothing said", unsaid, half, "", command),
-        {
-            "figure": "... hottest",
-            "value": max(run["hottest_c"] for run in lying),
-            "unit": "degC",
-            "target": "",
-            "command": command,
-        },
-        share("sound sensors, a supply that sags and steps: a fault", len(blamed), half, "", command),
-    ]
+    figures = (
+        share("a sensor begins to lie: above 120 degC", len(hot), half),
+        share("... and nothing said", sum(not run["faults"] for run in hot), half),
+        ("... hottest", max(run["hottest_c"] for run in lying), "degC"),
+        share("sound sensors, a supply that sags and steps: a fault", len(blamed), half),
+    )
+    rows = [{"figure": f, "value": v, "unit": u, "target": "", "command": command} for f, v, u in figures]
     for row in rows:
         print(f"{row['figure']:85} {row['value']:8.2f} {row['unit']}")
     if options.json:
