@@ -144,10 +144,7 @@ def measure(section: Section) -> None:
     with tempfile.TemporaryDirectory() as directory:
         written: list[tuple[Path, Path]] = []
         arguments = shlex.split(section.command)
-        for wanted, option, suffix in (
-            (section.json, "--json", ".json"),
-            (section.markdown, "--markdown", ".md"),
-        ):
+        for wanted, option, suffix in ((section.json, "--json", ".json"), (section.markdown, "--markdown", ".md")):
             if wanted:
                 path = Path(directory) / f"{section.name}{suffix}"
                 arguments += [option, str(path)]

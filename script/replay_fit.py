@@ -129,12 +129,7 @@ def fit(log: Run) -> tuple[list[float], list[float], float, float]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     default_data = os.environ.get("NINESPRING_DATA") or ROOT / "data"
-    parser.add_argument(
-        "--data",
-        type=Path,
-        default=Path(default_data),
-        help="folder that holds tclab_apm/",
-    )
+    parser.add_argument("--data", type=Path, default=Path(default_data), help="folder that holds tclab_apm/")
     parser.add_argument("-o", "--output", type=Path, help="keep logs and models in this folder")
     parser.add_argument("--json", type=Path, help="write the errors to this JSON file")
     arguments = parser.parse_args()

@@ -60,11 +60,7 @@ def effect_numbers(name: str, rng: np.random.Generator) -> dict[str, float]:
         "latent_heat": lambda: {"joule": u(3.0, 10.0)},
         "resistance_phase": lambda: {"ratio": u(1.15, 1.35) if either else u(0.75, 0.88)},
         "shared_air": lambda: {"capacity": u(2.0, 8.0), "exchange": u(0.06, 0.16)},
-        "plate_conduction": lambda: {
-            "coupling": u(0.5e-3, 2e-3),
-            "capacity": u(2.0, 10.0),
-            "loss": u(5e-3, 20e-3),
-        },
+        "plate_conduction": lambda: {"coupling": u(0.5e-3, 2e-3), "capacity": u(2.0, 10.0), "loss": u(5e-3, 20e-3)},
         "fan_wake": lambda: {"conductance": u(0.5e-3, 2.5e-3)},
         "edge_loss": lambda: {"fraction": u(0.08, 0.3), "per_side": float(either)},
         "spring_mismatch": lambda: {
@@ -73,18 +69,11 @@ def effect_numbers(name: str, rng: np.random.Generator) -> dict[str, float]:
             "mass_scale": u(0.85, 1.15),
         },
         "supply_sag": lambda: {"fraction": u(0.006, 0.025)},
-        "ambient_drift": lambda: {
-            "kelvin": u(1.0, 3.5) * (1 if either else -1),
-            "period_s": u(900.0, 2500.0),
-        },
+        "ambient_drift": lambda: {"kelvin": u(1.0, 3.5) * (1 if either else -1), "period_s": u(900.0, 2500.0)},
         "sensor_lag": lambda: {"tau_s": u(1.5, 12.0)},
         "sensor_gain": lambda: {"gain": 1 + u(0.03, 0.08) * (1 if either else -1)},
         "optical_mixing": lambda: {"fraction": u(0.01, 0.05)},
-        "holder_mass": lambda: {
-            "coupling": u(1.5e-3, 6e-3),
-            "capacity": u(0.15, 1.0),
-            "loss": u(0.2e-3, 1.5e-3),
-        },
+        "holder_mass": lambda: {"coupling": u(1.5e-3, 6e-3), "capacity": u(0.15, 1.0), "loss": u(0.2e-3, 1.5e-3)},
         "loose_contact": lambda: {
             "spring": a,
             "period_s": u(90.0, 240.0),

@@ -96,26 +96,12 @@ def section() -> tuple[str, list[dict[str, Any]]]:
                 f"{rival.separating_experiment}."
             )
     figures = [
-        (
-            "paper: COMSOL's model against the camera, hot springs at 105",
-            at_105,
-            "14.2",
-        ),
+        ("paper: COMSOL's model against the camera, hot springs at 105", at_105, "14.2"),
         ("paper: the same, hot springs at 99", before, ""),
-        (
-            f"paper: with {told.effects[0].name}, one number",
-            told.after.rmse_c,
-            "",
-        ),
+        (f"paper: with {told.effects[0].name}, one number", told.after.rmse_c, ""),
         ("paper: the same, left one out", told.after.holdout_rmse_c, ""),
     ]
     return "\n".join(lines) + "\n", [
-        {
-            "figure": name,
-            "value": round(value, 2),
-            "unit": "K",
-            "target": target,
-            "command": COMMAND,
-        }
+        {"figure": name, "value": round(value, 2), "unit": "K", "target": target, "command": COMMAND}
         for name, value, target in figures
     ]

@@ -20,15 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from cases import (
-    DEVELOPMENT_SEEDS,
-    NOISE_C,
-    REPORTING_SEEDS,
-    Case,
-    make_case,
-    plan,
-    write_logs,
-)
+from cases import DEVELOPMENT_SEEDS, NOISE_C, REPORTING_SEEDS, Case, make_case, plan, write_logs
 from kept import Kept
 from ninespring.find import diagnosis, search
 from ninespring.find.evidence import excess
@@ -203,56 +195,20 @@ def figures(cases: list[dict[str, Any]]) -> list[dict[str, Any]]:
     ]
     hits, total = (sum(c["covered"][k] for c in cases) for k in (0, 1))
     rows: list[tuple[str, tuple[float, int, int], str]] = [
-        (
-            "single effect adopted or named as a rival",
-            ratio(single, lambda c: named(c, c["truth"][0])),
-            ">= 97",
-        ),
-        (
-            "single effect adopted itself",
-            ratio(single, lambda c: c["truth"][0] in c["adopted"]),
-            "",
-        ),
-        (
-            "single: nothing adopted beside it",
-            ratio(single, lambda c: len(c["adopted"]) <= 1),
-            "",
-        ),
-        (
-            "both effects of a pair",
-            ratio(pairs, lambda c: all(named(c, e) for e in c["truth"])),
-            ">= 90",
-        ),
-        (
-            "held-out error within 1.15 of the noise, singles",
-            ratio(single, floor),
-            ">= 90",
-        ),
-        (
-            "held-out error within 1.15 of the noise, pairs",
-            ratio(pairs, floor),
-            ">= 90",
-        ),
-        (
-            "nothing adopted where nothing is missing",
-            ratio(none, lambda c: not c["adopted"]),
-            ">= 95",
-        ),
+        ("single effect adopted or named as a rival", ratio(single, lambda c: named(c, c["truth"][0])), ">= 97"),
+        ("single effect adopted itself", ratio(single, lambda c: c["truth"][0] in c["adopted"]), ""),
+        ("single: nothing adopted beside it", ratio(single, lambda c: len(c["adopted"]) <= 1), ""),
+        ("both effects of a pair", ratio(pairs, lambda c: all(named(c, e) for e in c["truth"])), ">= 90"),
+        ("held-out error within 1.15 of the noise, singles", ratio(single, floor), ">= 90"),
+        ("held-out error within 1.15 of the noise, pairs", ratio(pairs, floor), ">= 90"),
+        ("nothing adopted where nothing is missing", ratio(none, lambda c: not c["adopted"]), ">= 95"),
         (
             "nothing adopted, or the true effect, where it is too small to matter",
             ratio(small, lambda c: not set(c["adopted"]) - set(c["truth"])),
             "",
         ),
-        (
-            "flagged unexplained, effect outside the library",
-            ratio(outside, lambda c: c["unexplained"]),
-            ">= 90",
-        ),
-        (
-            "outside the library: nothing adopted",
-            ratio(outside, lambda c: not c["adopted"]),
-            "",
-        ),
+        ("flagged unexplained, effect outside the library", ratio(outside, lambda c: c["unexplained"]), ">= 90"),
+        ("outside the library: nothing adopted", ratio(outside, lambda c: not c["adopted"]), ""),
         ("known beside unknown: the known one named", ratio(beside, lambda c: named(c, c["truth"][0])), ">= 90"),
         ("known beside unknown: flagged unexplained", ratio(beside, lambda c: c["unexplained"]), ">= 95"),
         (
@@ -299,10 +255,7 @@ def figures(cases: list[dict[str, Any]]) -> list[dict[str, Any]]:
         if total
     ]
     seconds = sorted(c["seconds"] for c in cases)
-    for name, value in (
-        ("median", seconds[len(seconds) // 2]),
-        ("longest", seconds[-1]),
-    ):
+    for name, value in (("median", seconds[len(seconds) // 2]), ("longest", seconds[-1])):
         out.append(
             {
                 "figure": f"one core's time of one diagnosis, {name}",
@@ -341,16 +294,7 @@ def confusion(cases: list[dict[str, Any]]) -> list[list[str]]:
     return rows
 
 
-HEADER = [
-    "truth",
-    "cases",
-    "adopted",
-    "rivals",
-    "unexplained",
-    "held out before",
-    "after",
-    "third log",
-]
+HEADER = ["truth", "cases", "adopted", "rivals", "unexplained", "held out before", "after", "third log"]
 
 
 def table(found: list[dict[str, Any]], rows: list[list[str]], count: int, seeds: str) -> str:
@@ -381,20 +325,11 @@ def main() -> int:
         default=10,
         help=f"seeds; each makes {len(EFFECTS)} singles, 12 pairs, 4 none, 8 outside, 10 beside, 3 alloys",
     )
-    parser.add_argument(
-        "--first",
-        type=int,
-        default=None,
-        help="first seed (default: the reporting range)",
-    )
+    parser.add_argument("--first", type=int, default=None, help="first seed (default: the reporting range)")
     parser.add_argument("--quick", action="store_true", help="one seed of singles and none, for CI")
     parser.add_argument("--development", action="store_true", help="seeds of the development range")
     parser.add_argument("--groups", default=",".join(GROUPS), help="which, comma-separated (default: all)")
-    parser.add_argument(
-        "--only",
-        default="",
-        help="only cases with one of these effects, comma-separated",
-    )
+    parser.add_argument("--only", default="", help="only cases with one of these effects, comma-separated")
     parser.add_argument(
         "--collect", action="store_true", help="keep every effect that the search adopts, however unlikely"
     )
@@ -436,12 +371,7 @@ def main() -> int:
             )
     cases = [kept.cases[key] for key in keys]
     found = figures(cases)
-    text = table(
-        found,
-        confusion(cases),
-        len(cases),
-        f"seeds {first} to {first + options.seeds - 1}",
-    )
+    text = table(found, confusion(cases), len(cases), f"seeds {first} to {first + options.seeds - 1}")
     if options.markdown == "-":
         print(text)
     else:

@@ -17,18 +17,8 @@ from ninespring.model.models import Array, Model
 from paper import COMMAND, data
 
 LOGS = (
-    (
-        "energy_balance_600",
-        "tclab_apm/energy_balance_600.txt",
-        "tclab",
-        "1.26; with lag and ambient 0.63",
-    ),
-    (
-        "second_order_mimo_201",
-        "tclab_apm/second_order_mimo_201.txt",
-        "tclab",
-        "1.23; with lag and ambient 0.58",
-    ),
+    ("energy_balance_600", "tclab_apm/energy_balance_600.txt", "tclab", "1.26; with lag and ambient 0.63"),
+    ("second_order_mimo_201", "tclab_apm/second_order_mimo_201.txt", "tclab", "1.23; with lag and ambient 0.58"),
     ("tclab_prbs", "tclab_mlid_prbs/tclab_prbs.csv", "tclab", ""),
 )
 

@@ -19,16 +19,7 @@ MODEL_C = 0.5
 
 
 def run(program: str, avr: Path, scenario: Path, board: str, output: Path, *more: str) -> None:
-    command = [
-        program,
-        "run",
-        str(scenario),
-        "--board",
-        board,
-        "-o",
-        str(output),
-        *more,
-    ]
+    command = [program, "run", str(scenario), "--board", board, "-o", str(output), *more]
     if board == "avr":
         command += ["--elf", str(avr / "firmware.elf")]
     result = subprocess.run(command, check=False, capture_output=True, text=True)

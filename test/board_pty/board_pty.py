@@ -25,11 +25,7 @@ class Board:
     """A simulated board in its own process; `with` ends it as Ctrl-C would."""
 
     def __init__(self, program: str, elf: Path, *more: str) -> None:
-        self.process = subprocess.Popen(
-            [program, "board", "--elf", str(elf), *more],
-            stdout=subprocess.PIPE,
-            text=True,
-        )
+        self.process = subprocess.Popen([program, "board", "--elf", str(elf), *more], stdout=subprocess.PIPE, text=True)
         assert self.process.stdout is not None
         self.port = self.process.stdout.readline().strip()
         assert self.port.startswith("/dev/"), f"no pty: {self.port!r}"
@@ -133,17 +129,11 @@ def a_host_alive_by_the_wall_clock_is_not_silent(program: str, elf: Path) -> Non
 def keeps_its_eeprom(program: str, elf: Path, folder: Path) -> None:
     image = folder / "eeprom.bin"
     image.unlink(missing_ok=True)
-    with (
-        Board(program, elf, "--speed", "max", "--eeprom", str(image)) as board,
-        first_contact(board) as port,
-    ):
+    with Board(program, elf, "--speed", "max", "--eeprom", str(image)) as board, first_contact(board) as port:
         assert ask(port, "$loss_w_per_k=0.006543") == ["ok"]
         assert ask(port, "$save")[-1] == "ok"
     assert image.stat().st_size == 4096
-    with (
-        Board(program, elf, "--speed", "max", "--eeprom", str(image)) as board,
-        first_contact(board) as port,
-    ):
+    with Board(program, elf, "--speed", "max", "--eeprom", str(image)) as board, first_contact(board) as port:
         assert "$loss_w_per_k=0.006543" in ask(port, "$loss_w_per_k")
     image.unlink()
 
@@ -192,13 +182,7 @@ def refuses_what_is_wrong(program: str, elf: Path) -> None:
         ["--elf", str(elf), "--thermometer-rate", "2"],
         ["--elf", str(elf), "--thermometers", "pty", "--thermometer-rate", "0"],
     ):
-        result = subprocess.run(
-            [program, "board", *arguments],
-            check=False,
-            capture_output=True,
-            text=True,
-            timeout=60,
-        )
+        result = subprocess.run([program, "board", *arguments], check=False, capture_output=True, text=True, timeout=60)
         assert result.returncode == 2, result
         assert result.stderr.count("\n") == 1, result.stderr
 

@@ -24,16 +24,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         result = Path(folder) / "fit.json"
         script = root / "script" / "replay_fit.py"
-        command = [
-            python,
-            script,
-            "--data",
-            data,
-            "-o",
-            folder,
-            "--json",
-            result,
-        ]
+        command = [python, script, "--data", data, "-o", folder, "--json", result]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         print(done.stdout + done.stderr)
         if done.returncode != 0 or "Not good yet" not in done.stdout:

@@ -78,10 +78,7 @@ def test_a_board_alone_tells_capacity_loss_coupling_and_latent_heat(tmp_path: Pa
 
 @pytest.mark.parametrize(
     ("change", "said"),
-    [
-        ({"strongest_a": 0.9}, "no spring's v / i ever changes"),
-        ({"ambient_c": None}, "log ambient_c"),
-    ],
+    [({"strongest_a": 0.9}, "no spring's v / i ever changes"), ({"ambient_c": None}, "log ambient_c")],
 )
 def test_a_log_that_cannot_tell_is_refused_with_what_it_lacks(tmp_path: Path, change: dict, said: str) -> None:
     code, told = ended("fit", board_log(tmp_path / "board.csv", **change), "-o", tmp_path / "m.toml")

@@ -265,10 +265,7 @@ def test_switches_in_words_and_nanoseconds_are_read(tmp_path: Path) -> None:
     rows = "1600000000000000000,False,ON,20\n1600000003000000000,True,off,20.5\n"
     (tmp_path / "logger.csv").write_text("t,heater,fan,T\n" + rows)
     text = importing.import_table(tmp_path / "logger.csv", tmp_path / "map.toml").splitlines()
-    assert [row.split(",", 1)[1] for row in text[-2:]] == [
-        "0.00000,1.00000,20.00000",
-        "1.00000,0.00000,20.50000",
-    ]
+    assert [row.split(",", 1)[1] for row in text[-2:]] == ["0.00000,1.00000,20.00000", "1.00000,0.00000,20.50000"]
 
 
 def test_millivolts_are_not_taken_for_kelvin(tmp_path: Path) -> None:

@@ -469,11 +469,7 @@ fuzzed = settings(max_examples=200, deadline=None, suppress_health_check=[Health
 
 
 @fuzzed
-@given(
-    st.integers(0, ROWS - 1),
-    st.integers(0, 4),
-    st.sampled_from(["x", "inf", "1_0", "--1", "1e999", "0x10", "é"]),
-)
+@given(st.integers(0, ROWS - 1), st.integers(0, 4), st.sampled_from(["x", "inf", "1_0", "--1", "1e999", "0x10", "é"]))
 def test_a_bad_cell_anywhere_is_refused_at_its_line_and_column(tmp_path: Path, row: int, cell: int, junk: str) -> None:
     lines = GOOD.splitlines()
     cells = lines[2 + row].split(",")

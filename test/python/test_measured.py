@@ -39,11 +39,7 @@ def test_the_laboratory_is_explained_far_better_than_by_the_textbook(measured: P
     path = tmp_path / "log.csv"
     path.write_text(importing.import_table(measured / "tclab_apm" / f"{file}.txt", "tclab"))
     model = Model(Array(1, 2))
-    model.parameters = {
-        "heat_capacity_j_per_k": 2.0,
-        "loss_w_per_k": 0.012,
-        "command_power_w": 1.0,
-    }
+    model.parameters = {"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.012, "command_power_w": 1.0}
     result = diagnosis.diagnose(Array(1, 2), [read_log(path, 2)], model=model).result
     effects = {e["name"]: e.get("variant") for e in result["effects"]}
     assert "sensor_lag" in effects

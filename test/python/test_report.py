@@ -193,12 +193,7 @@ def told(**more: object) -> results.Diagnosis:
 
 def effect(name: str, variant: str = "") -> results.Effect:
     return an_effect(
-        name,
-        variant=variant or results.UNSET,
-        holdout_rmse_c=0.31,
-        probability=0.99,
-        certainty="certain",
-        text="",
+        name, variant=variant or results.UNSET, holdout_rmse_c=0.31, probability=0.99, certainty="certain", text=""
     )
 
 

@@ -84,10 +84,7 @@ def fit(*logs: Log, effects: Sequence[str] = (), array: Array | str | Path | Non
 
 
 def diagnose(
-    *logs: Log,
-    array: Array | str | Path | None = None,
-    model: Model | str | Path | None = None,
-    frozen: bool = False,
+    *logs: Log, array: Array | str | Path | None = None, model: Model | str | Path | None = None, frozen: bool = False
 ) -> Diagnosis:
     """Find the effects that the model lacks, in logs of one array.
 

@@ -12,11 +12,7 @@ class InputError(Exception):
     """Input that cannot be used. Shown as one line; the program ends with exit code 2."""
 
     def __init__(
-        self,
-        message: str,
-        file: str | Path | None = None,
-        line: int | None = None,
-        column: int | None = None,
+        self, message: str, file: str | Path | None = None, line: int | None = None, column: int | None = None
     ) -> None:
         self.message = " ".join(message.splitlines())  # a quoted cell may hold line ends
         self.file = None if file is None else str(file)

@@ -153,7 +153,7 @@ def verify(
     write({json_path: results.checked(result), report_path: with_verification(report, result)})
     out.print(
         f"the chip's model on {log.name}: error {result.before.rmse_c:.2f} K rms as it is, "
-        f"{result.after.rmse_c:.2f} K with the model's settings",
+        f"{result.after.rmse_c:.2f} K with the model's settings"
     )
     if result.after.rmse_c > result.before.rmse_c:
         raise WorkError("the model's settings make the chip's error larger on this log: do not upload them")

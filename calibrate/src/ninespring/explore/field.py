@@ -400,11 +400,6 @@ def build(geometry: Geometry, fan: bool, mesh: Mesh, film: Film | None = None) -
         lanes,
         times * outer,
         times * freed,
-        np.hstack(
-            [
-                np.repeat(section.doflocs.T, levels, axis=0),
-                np.tile(heights, len(ones))[:, None],
-            ]
-        ),
+        np.hstack([np.repeat(section.doflocs.T, levels, axis=0), np.tile(heights, len(ones))[:, None]]),
         levels,
     )

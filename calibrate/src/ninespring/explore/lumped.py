@@ -27,12 +27,7 @@ STILL = (
 )
 PLATE = ("plate_coupling_w_per_k", "plate_heat_capacity_j_per_k", "plate_loss_w_per_k")
 FAN = ("loss_fan_w_per_k", "orthogonal_fan_w_per_k", "diagonal_fan_w_per_k", "second_fan_w_per_k", "wake_w_per_k")
-BELOW = (
-    "stiffness_loss_w_per_k",
-    "stiffness_heat_capacity_j_per_k",
-    "stiffness_coupling_scale",
-    "series_w_per_k",
-)
+BELOW = ("stiffness_loss_w_per_k", "stiffness_heat_capacity_j_per_k", "stiffness_coupling_scale", "series_w_per_k")
 BELOW_PLATE = ("stiffness_plate_coupling_w_per_k",)
 BELOW_FAN = ("stiffness_loss_fan_w_per_k", "series_fan_w_per_k")
 """Of the stiffness layer. What begins with `stiffness_` and is not the scale, the plant has for each of its springs."""

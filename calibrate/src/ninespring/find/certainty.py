@@ -24,13 +24,7 @@ NAMED = 0.5
 """Probability from which an effect is named at all."""
 ENOUGH_NATS = 10.0
 """Evidence beyond which more says nothing more (twenty thousand to one): what stands in for something else has hundreds, too."""
-WEIGHTS = {
-    "one": -7.80,
-    "share": 1.84,
-    "in_time": -1.97,
-    "nats": 5.10,
-    "flexible": -3.43,
-}
+WEIGHTS = {"one": -7.80, "share": 1.84, "in_time": -1.97, "nats": 5.10, "flexible": -3.43}
 """Logistic weights of a witness: fitted by bench/diagnose/certainty.py to developing seeds, checked on reporting ones; that of the nats moved with
 ENOUGH_NATS from 30 to 10, so that what has more than enough is as likely as it was."""
 

@@ -153,12 +153,7 @@ class _Tried:
 
 
 def _tried(
-    array: Array,
-    declared: Mapping[str, float],
-    effect: Effect,
-    states: list[State],
-    watched: int,
-    before: np.ndarray,
+    array: Array, declared: Mapping[str, float], effect: Effect, states: list[State], watched: int, before: np.ndarray
 ) -> _Tried:
     """Fit an effect's one number to all states, and to all but each in turn; its error by the slope at what was found."""
     name, steady = effect.name, effect.steady

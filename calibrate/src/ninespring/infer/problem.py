@@ -430,11 +430,7 @@ class Problem:
     # ---- fitting ----------------------------------------------------------------------------------------
 
     def jacobian(
-        self,
-        spec: Spec,
-        values: np.ndarray,
-        predicted: Sequence[np.ndarray],
-        columns: Sequence[int] | None = None,
+        self, spec: Spec, values: np.ndarray, predicted: Sequence[np.ndarray], columns: Sequence[int] | None = None
     ) -> np.ndarray:
         """Return d(residual vector)/d(inner coordinate) by one-sided differences, simulated in parallel."""
         columns = range(len(spec.free)) if columns is None else columns

@@ -217,10 +217,7 @@ def guessed(run: Run, usual_c: float, over: tuple[float, float] | None, spread_k
     here = first + over[0]
     both = warm.with_told(here, over[1] ** 2)
     likely = AS_OTHERS if apart <= TOGETHER_K else COLDEST_RESTED
-    return [
-        replace(both, nats=both.nats + math.log(likely)),
-        replace(warm, nats=math.log((1.0 - likely) / WARM_K)),
-    ]
+    return [replace(both, nats=both.nats + math.log(likely)), replace(warm, nats=math.log((1.0 - likely) / WARM_K))]
 
 
 def begun(run: Run) -> Run | None:

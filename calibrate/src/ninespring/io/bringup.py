@@ -499,9 +499,7 @@ def step_all_springs(board: Board, step: Step, hands: Hands | None) -> None:
     last = np.mean([one.current_a for one in together[-ROWS_HZ:]], axis=0)
     wanted_a = min(tested_a(settings), float(settings["supply_limit_a"]) / springs)
     step.tell(
-        "all together",
-        f"{last.sum():.2f} A, {last.min():.3f} to {last.max():.3f} A each",
-        f"{wanted_a:.2f} A each",
+        "all together", f"{last.sum():.2f} A, {last.min():.3f} to {last.max():.3f} A each", f"{wanted_a:.2f} A each"
     )
     step.found += faults
     if not faults and abs(last - wanted_a).max() > 0.1:
@@ -602,11 +600,7 @@ def do_step(board: Board, name: str, hands: Hands | None) -> Step:
 
 
 def converse(
-    board: Board,
-    output: Path,
-    hands: Hands | None,
-    say: Callable[[str], None] = print,
-    again: str | None = None,
+    board: Board, output: Path, hands: Hands | None, say: Callable[[str], None] = print, again: str | None = None
 ) -> dict[str, Step]:
     """Go through the steps that were not right before; stop at the first in which something is wrong, or where `hands` says no.
 

@@ -92,10 +92,7 @@ def _read(path: Path) -> Entry:
 
 
 def send(
-    board: Board,
-    settings: Mapping[str, str],
-    by: str,
-    say: Callable[[str, int], None] = lambda line, count: None,
+    board: Board, settings: Mapping[str, str], by: str, say: Callable[[str, int], None] = lambda line, count: None
 ) -> None:
     """Send settings to a board, read them back, save them; what it had before is kept."""
     before = board.settings()

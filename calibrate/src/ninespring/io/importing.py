@@ -405,11 +405,7 @@ def _refuse_kelvin(temperature: np.ndarray, advice: str, path: str | Path) -> No
 
 
 def merge_into_log(
-    log_path: str | Path,
-    times_s: np.ndarray | None,
-    interval_s: float,
-    offset_s: float,
-    columns: dict[str, np.ndarray],
+    log_path: str | Path, times_s: np.ndarray | None, interval_s: float, offset_s: float, columns: dict[str, np.ndarray]
 ) -> str:
     """Return a log's text with camera temperatures put onto its times (straight lines between frames, none across a gap).
 

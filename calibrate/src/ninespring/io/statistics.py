@@ -149,10 +149,7 @@ def mean_there(values: np.ndarray, axis: int) -> np.ndarray:
 
 
 def structure(
-    series: Sequence[np.ndarray],
-    noise: Sequence[np.ndarray],
-    width: int,
-    starts: Sequence[Sequence[int]],
+    series: Sequence[np.ndarray], noise: Sequence[np.ndarray], width: int, starts: Sequence[Sequence[int]]
 ) -> np.ndarray:
     """Return the variance of what is slower than `width` rows, per run and column, in units of noise^2.
 

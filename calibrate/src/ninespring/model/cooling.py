@@ -37,11 +37,7 @@ NUMBERS = {
     "baffle_height_mm": (0.1, 1000.0),
     "surface_c": (40.0, 200.0),
 }
-WORDS = {
-    "fan_direction": DIRECTIONS,
-    "plate": ("none", *MATERIALS),
-    "baffle": ("none", *MATERIALS),
-}
+WORDS = {"fan_direction": DIRECTIONS, "plate": ("none", *MATERIALS), "baffle": ("none", *MATERIALS)}
 KEYS = (*NUMBERS, *WORDS)
 
 

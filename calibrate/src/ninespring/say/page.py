@@ -172,11 +172,7 @@ def html_report(found: Diagnosis, folder: str = "diagnosis", asked: str = "") ->
 def steady_report(told: results.SteadyDiagnosis) -> str:
     """Return the report of a steady table's diagnosis as HTML."""
     return render(
-        "steady.html",
-        title="Ninespring diagnosis",
-        told=told,
-        header=HEADER,
-        candidates=candidate_rows(told),
+        "steady.html", title="Ninespring diagnosis", told=told, header=HEADER, candidates=candidate_rows(told)
     )
 
 

@@ -165,10 +165,7 @@ def read_text(path: str | Path) -> str:
 
 
 def log_text(
-    time_s: np.ndarray,
-    columns: dict[str, np.ndarray],
-    keys: dict[str, str] | None = None,
-    decimals: int = 4,
+    time_s: np.ndarray, columns: dict[str, np.ndarray], keys: dict[str, str] | None = None, decimals: int = 4
 ) -> str:
     """Return a log as text: `# key: value` lines, header, rows; NaN becomes an empty cell."""
     import pandas as pd

@@ -28,7 +28,5 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
 
 
 EFFECT = Effect(
-    "holder_mass",
-    _candidates,
-    says=says("Behind each spring a holder warms up: {} to it.", COUPLING, "mW/K", 1e3),
+    "holder_mass", _candidates, says=says("Behind each spring a holder warms up: {} to it.", COUPLING, "mW/K", 1e3)
 )
