@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from ninespring.io.logs import log_text
 from ninespring.model import native
+from plants import a_plant, columns_of, switched
 
 Make = Callable[..., Path]
 
@@ -41,32 +42,16 @@ def _maker(folder: Path) -> Make:
     ) -> Path:
         rng = np.random.default_rng(seed)
         time_s = np.arange(float(seconds))
-        current = np.zeros((seconds, 9))
-        for k in range(9):
-            at = int(rng.integers(5, 40))
-            while at < seconds:
-                hold = int(rng.integers(30, 120))
-                current[at : at + hold, k] = 0.0 if rng.random() < 0.4 else rng.uniform(1.0, 1.8)
-                at += hold
+        current = switched(rng, seconds, 0.0, 1.0, 1.8)
         fan = ((time_s // 200) % 2 == 1).astype(float)
         if half:  # of its command, after the first time
             fan[400:] *= 0.5
-        plant = native.Plant(3, 3)
-        plant.set_effects(effects or {})
-        for values in (effects or {}).values():
-            plant.set_all(values)
-        plant.reset()
         mode = native.POWER if columns == "iv" else native.CURRENT
         drive = current**2 * 0.2 if columns == "iv" else current
-        shown = plant.simulate(time_s, mode, drive, fan, np.full(seconds, 20.0))
+        shown = a_plant((3, 3), effects or {}).simulate(time_s, mode, drive, fan, np.full(seconds, 20.0))
         shown = shown + rng.normal(0.0, noise, shown.shape)
-        out: dict[str, np.ndarray] = {}
-        for k in range(9):
-            out[f"i{k + 1}_a"] = current[:, k]
-            if columns == "iv":
-                out[f"v{k + 1}_v"] = current[:, k] * 0.2
-        out |= {f"t{k + 1}_c": shown[:, k] for k in range(9)}
-        out |= {"fan": fan, "ambient_c": np.full(seconds, 20.0)}
+        volts = {"v": current * 0.2} if columns == "iv" else {}
+        out = columns_of(i=current, **volts, t=shown) | {"fan": fan, "ambient_c": np.full(seconds, 20.0)}
         if change:
             change(out)
         stamps = out.pop("time_s", time_s)

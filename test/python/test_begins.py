@@ -13,6 +13,7 @@ from ninespring.io.logs.run import Run
 from ninespring.model import native
 from ninespring.model.models import Array, Model
 from ninespring.model.simulate import settles_s
+from plants import a_plant
 
 ROWS, ROOM_C, HELD_W = 900, 20.0, 0.35
 
@@ -129,10 +130,7 @@ def test_a_spring_begins_on_its_branch_without_v_and_i_too(tmp_path: Path, full_
 
 def test_what_is_tried_on_the_way_to_a_start_leaves_no_phase() -> None:
     """A thermometer that shows too much: where it seems to be the spring would be austenite."""
-    plant = native.Plant(1, 1)
-    plant.set_effects(["sensor_gain"])
-    plant.set("sensor_gain", 1.3)
-    plant.reset()
+    plant = a_plant((1, 1), {"sensor_gain": {"sensor_gain": 1.3}})
     plant.start_from_measured(np.array([104.0]))
     assert plant.measured_c()[0] == pytest.approx(104.0, abs=0.001)
     assert plant.austenite()[0] == 0.0
@@ -142,11 +140,7 @@ def test_a_log_alone_that_begins_at_rest_begins_at_its_room_whatever_its_model_l
     """Free, its room stands in for the latent heat that is not declared: 34 degC."""
     time_s = np.arange(200.0)
     drive = np.where((time_s >= 20.0) & (time_s < 50.0) | (time_s > 60.0), FULL_W, 0.0)[:, None]
-    plant = native.Plant(1, 1)
-    plant.set_effects(["latent_heat"])
-    plant.set("latent_heat_j", 8.0)
-    plant.set_ambient(ROOM_C)
-    plant.reset()
+    plant = a_plant((1, 1), {"latent_heat": {"latent_heat_j": 8.0}}, {"ambient_c": ROOM_C})
     shown = plant.simulate(time_s, native.POWER, drive, np.zeros(200), np.full(200, ROOM_C))
     shown += np.random.default_rng(1).normal(0.0, 0.1, shown.shape)
     run = Run("run", "", time_s, "power", drive, shown, np.zeros(200), None)

@@ -25,6 +25,7 @@ from ninespring.io import results
 from ninespring.io.logs import log_text, read_log, read_table, write_atomically
 from ninespring.model import native
 from ninespring.model.models import Array, Model, model_text, read_model
+from plants import a_plant
 from rich.console import Console
 
 
@@ -117,9 +118,7 @@ def test_fit_takes_the_effects_that_a_diagnosis_named_by_v_over_i(make_log, tmp_
     def steps(columns: dict[str, np.ndarray]) -> None:
         """Heat the springs through, each with two resistances, by how much of it has transformed."""
         rng = np.random.default_rng(8)
-        plant = native.Plant(3, 3)
-        plant.set_effects(["latent_heat"])
-        plant.reset()
+        plant = a_plant((3, 3), ["latent_heat"])
         power = 1.4 * np.column_stack([columns[f"i{k}_a"] * columns[f"v{k}_v"] for k in range(1, 10)])
         seconds = len(power)
         traced = plant.trace(np.arange(float(seconds)), native.POWER, power, columns["fan"], np.full(seconds, 20.0))

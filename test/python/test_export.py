@@ -18,6 +18,7 @@ from ninespring.infer.predict import predict_by_chip
 from ninespring.io.logs import read_log, write_atomically
 from ninespring.model import native
 from ninespring.model.models import Array, Model, model_text, read_model
+from plants import a_plant, columns_of
 
 
 def lukewarm(columns: dict[str, np.ndarray]) -> None:
@@ -80,15 +81,11 @@ def test_numbers_that_are_known_in_combination_only_are_written_together(make_lo
     """One run of all springs alike: losses and couplings cannot be told, and what is written must still be right."""
 
     def together(columns: dict[str, np.ndarray]) -> None:
-        plant = native.Plant(3, 3)
-        plant.set_all({"loss_w_per_k": 0.007})
-        plant.reset()
         drive = np.repeat(np.where(np.arange(600) % 300 < 200, 0.3, 0.0)[:, None], 9, axis=1)
+        plant = a_plant((3, 3), numbers={"loss_w_per_k": 0.007})
         shown = plant.simulate(np.arange(600.0), native.POWER, drive)
-        for k in range(1, 10):
-            columns[f"i{k}_a"], columns[f"v{k}_v"] = drive[:, k - 1], np.ones(600)
-            columns[f"t{k}_c"] = shown[:, k - 1] + np.random.default_rng(k).normal(0, 0.3, 600)
-        columns["fan"] = np.zeros(600)
+        shown += np.column_stack([np.random.default_rng(k).normal(0, 0.3, 600) for k in range(1, 10)])
+        columns |= columns_of(i=drive, v=np.ones_like(drive), t=shown) | {"fan": np.zeros(600)}
 
     run_ = read_log(make_log(change=together))
     found = diagnosis.diagnose(Array(), [run_])
@@ -137,8 +134,7 @@ def test_settings_that_drive_worse_are_refused_and_written_only_by_force(
 
 
 def test_a_drive_is_measured_as_it_was() -> None:
-    plant = native.Plant(3, 3)
-    plant.set_effects(["latent_heat", "resistance_phase"])
+    plant = a_plant((3, 3), ["latent_heat", "resistance_phase"])
     alone = np.arange(9) == 4
     good = drive.drive(plant, "", alone)
     assert good.held > 0.9 and good.heating_s < 60 and good.hottest_c < 130 and good.undriven < 0.1

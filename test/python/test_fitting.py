@@ -19,6 +19,7 @@ from ninespring.io.logs import read_log
 from ninespring.io.logs.run import Run
 from ninespring.model import effects, native
 from ninespring.model.models import Array
+from plants import a_plant
 
 TRUE = {
     "heat_capacity_j_per_k": 0.3,
@@ -160,10 +161,8 @@ def test_bounds_hold_and_are_reported(make_log) -> None:
 
 
 def test_springs_start_where_the_sensors_would_show_the_first_row() -> None:
-    plant = native.Plant(1, 2)
-    plant.set_effects(["sensor_gain", "optical_mixing"])
-    plant.set_all({"sensor_gain": 1.2, "sensor_offset_k": 1.5, "optical_share": 0.6, "optical_width": 0.3})
-    plant.reset()
+    numbers = {"sensor_gain": 1.2, "sensor_offset_k": 1.5, "optical_share": 0.6, "optical_width": 0.3}
+    plant = a_plant((1, 2), ["sensor_gain", "optical_mixing"], numbers)
     plant.start_from_measured(np.array([40.0, math.nan]))
     assert plant.measured_c()[0] == pytest.approx(40.0, abs=0.001)
     assert plant.temperature_c()[1] == 20.0

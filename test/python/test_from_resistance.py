@@ -15,6 +15,7 @@ from ninespring.io.logs import log_text, read_log
 from ninespring.model import native
 from ninespring.model.models import Array, read_model
 from ninespring.say import page
+from plants import a_plant, columns_of
 
 TRUE = {"heat_capacity_j_per_k": 0.34, "loss_w_per_k": 0.0052, "orthogonal_w_per_k": 0.0007, "latent_heat_j": 7.5}
 
@@ -29,12 +30,9 @@ def board_log(
     for k in range(9):
         for at in range(10 + 11 * k, rows, 150):
             current[at : at + 70, k] = strongest_a * rng.uniform(0.75, 1.0)
-    plant = native.Plant(3, 3)
-    plant.set_effects(["latent_heat", "resistance_phase", "spring_mismatch", *(effects or {})])
-    plant.set_all(TRUE | {f"resistance_scale[{k + 1}]": 1.0 + 0.03 * (k - 4) / 4 for k in range(9)})
-    for numbers in (effects or {}).values():
-        plant.set_all(numbers)
-    plant.reset()
+    own = {f"resistance_scale[{k + 1}]": 1.0 + 0.03 * (k - 4) / 4 for k in range(9)}
+    on = {"latent_heat": TRUE, "resistance_phase": {}, "spring_mismatch": own}
+    plant = a_plant((3, 3), on | (effects or {}))
     ohm = np.empty((rows, 9))
     for row in range(rows):
         ohm[row] = [native.library().plant_resistance_ohm(plant._plant, k) for k in range(9)]
@@ -46,8 +44,7 @@ def board_log(
     hunting = current + rng.uniform(-0.008, 0.008, (4, *current.shape))
     voltage = (4e-3 * np.round(hunting * ohm / 4e-3)).mean(axis=0)
     current = hunting.mean(axis=0)
-    columns = {f"i{k + 1}_a": current[:, k] for k in range(9)} | {f"v{k + 1}_v": voltage[:, k] for k in range(9)}
-    columns |= {"ambient_c": np.full(rows, 20.0)} | more
+    columns = columns_of(i=current, v=voltage) | {"ambient_c": np.full(rows, 20.0)} | more
     path.write_text(log_text(time_s, {name: one for name, one in columns.items() if one is not None}))
     return path
 

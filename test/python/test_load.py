@@ -12,9 +12,9 @@ from ninespring.find import diagnosis
 from ninespring.infer.predict import predict
 from ninespring.io.logs import log_text, read_log
 from ninespring.io.logs.run import Run
-from ninespring.model import native
 from ninespring.model.models import Array, model_text, read_model
 from ninespring.model.simulate import LOAD_STEP_N, load_changes, simulate_run
+from plants import a_plant, columns_of
 
 K_PER_N, NOISE_C, ROOM_C = 4.5, 0.2, 21.0
 
@@ -57,8 +57,7 @@ def loaded(path: Path, k_per_n: float, seed: int) -> Path:
                 low, high = np.where(more, low, middle), np.where(more, middle, high)
             true, phase = middle, there
     shown = shown + rng.normal(0.0, NOISE_C, shown.shape)
-    columns = {f"i{k + 1}_a": current[:, k] for k in range(2)} | {f"v{k + 1}_v": current[:, k] * ohm for k in range(2)}
-    columns |= {f"t{k + 1}_c": shown[:, k] for k in range(2)} | {"ambient_c": np.full(rows, ROOM_C)}
+    columns = columns_of(i=current, v=current * ohm, t=shown) | {"ambient_c": np.full(rows, ROOM_C)}
     path.write_text(log_text(np.arange(float(rows)), columns | {f"f{k + 1}_n": load[:, k] for k in range(2)}))
     return path
 
@@ -71,13 +70,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 def test_what_is_shown_as_a_load_moves_is_from_before(run: Run) -> None:
     shown = []
-    for lag_s in (None, 0.02):
-        plant = native.Plant(1, 2)
-        plant.set_effects(["latent_heat", "transformation_shift", *([] if lag_s is None else ["sensor_lag"])])
-        plant.set("transformation_shift_k_per_n", K_PER_N)
-        if lag_s is not None:
-            plant.set("sensor_lag_s", lag_s)
-        shown.append(simulate_run(plant, run, run.ambient_c))
+    on = {"latent_heat": {}, "transformation_shift": {"transformation_shift_k_per_n": K_PER_N}}
+    for lag in ({}, {"sensor_lag": {"sensor_lag_s": 0.02}}):
+        shown.append(simulate_run(a_plant((1, 2), on | lag), run, run.ambient_c))
     # the spring itself jumps by kelvins with its load: a thermometer that is quick shows that in the row after
     assert np.abs(shown[0] - shown[1]).max() < 0.3
 

@@ -15,8 +15,8 @@ from ninespring.errors import InputError
 from ninespring.find.steady import is_steady
 from ninespring.io.logs import condense, log_text, read_log, read_table
 from ninespring.io.logs.run import Run
-from ninespring.model import native
 from ninespring.model.simulate import simulate_run
+from plants import a_plant
 
 HEADER = "time_s,i1_a,t1_c\n"
 SWAP = (("i", "a", "v", "v"), ("v", "v", "i", "a"))
@@ -358,11 +358,7 @@ def test_endless_logs_are_averaged_where_nothing_happens_and_simulated_as_well_a
     assert span @ short.drive == pytest.approx(run.drive.sum(axis=0))
     switched = run.time_s[1:][(np.abs(np.diff(run.drive, axis=0)) > 0.05 * run.drive.max(axis=0)).any(axis=1)]
     assert np.isin(switched, short.time_s).all()
-    plant = native.Plant(3, 3)
-    plant.set_effects(true)
-    for values in true.values():
-        plant.set_all(values)
-    left = short.temperature_c - simulate_run(plant, short, short.ambient_c)
+    left = short.temperature_c - simulate_run(a_plant((3, 3), true), short, short.ambient_c)
     assert np.isfinite(left).mean() > 0.99
     assert np.sqrt(np.nanmean(left**2)) < 0.06
     assert any("20000 rows averaged" in note for note in short.notes)

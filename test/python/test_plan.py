@@ -16,6 +16,7 @@ from ninespring.io.logs import log_text
 from ninespring.io.recording import Step, script_lines
 from ninespring.model import native
 from ninespring.model.models import Array
+from plants import a_plant, columns_of
 
 
 def driven(steps: list[Step], springs: int, duration_s: float, current_a: float) -> tuple[np.ndarray, np.ndarray]:
@@ -44,9 +45,7 @@ def test_a_plan_keeps_the_limits_and_drives_every_spring(rows: int, cols: int, s
     assert len(np.unique(current[current > 0])) >= 3
     assert 0.2 < fan.mean() < 0.3 and not current[-60:].any()
     assert (fan == 0.5).mean() > 0.1 and (fan == 1.0).mean() > 0.1, "half the fan tells its curve"
-    plant = native.Plant(rows, cols)
-    plant.set_effects(["latent_heat", "resistance_phase"])
-    plant.reset()
+    plant = a_plant((rows, cols), ["latent_heat", "resistance_phase"])
     shown = plant.simulate(np.arange(900.0), native.CURRENT, current, fan, np.full(900, 20.0))
     assert 98.0 < shown.max() <= 105.0
 
@@ -55,9 +54,7 @@ def test_without_a_thermometer_every_spring_crosses_often_and_none_is_ever_witho
     made = plan.make_plan(Array(), 1800.0, 2.6, 14.0, 105.0, board_alone=True)
     current, fan = driven(script_lines("\n".join(made.steps), "steps.txt", 1800.0), 9, 1800, 2.6)
     assert current[1:].min() > 0.2 and current.sum(axis=1).max() <= 14.0
-    plant = native.Plant(3, 3)
-    plant.set_effects(["latent_heat", "resistance_phase"])
-    plant.reset()
+    plant = a_plant((3, 3), ["latent_heat", "resistance_phase"])
     traced = plant.trace(np.arange(1800.0), native.CURRENT, current, fan, np.full(1800, 20.0))
     for blown in (False, True):
         phase = traced[(fan > 0.5) == blown, :, 1]
@@ -90,15 +87,11 @@ def test_what_was_planned_identifies_the_array(tmp_path: Path) -> None:
     made = plan.make_plan(Array(), 900.0, 2.0, 14.0, 105.0)
     current, fan = driven(script_lines("\n".join(made.steps), "steps.txt"), 9, 900, 2.0)
     true = {"heat_capacity_j_per_k": 0.33, "loss_w_per_k": 0.0066, "orthogonal_w_per_k": 0.0008, "latent_heat_j": 7.0}
-    plant = native.Plant(3, 3)
-    plant.set_effects(["latent_heat"])
-    plant.set_all(true)
-    plant.reset()
+    plant = a_plant((3, 3), {"latent_heat": true})
     time_s, ambient = np.arange(900.0), np.full(900, 20.0)
     shown = plant.simulate(time_s, native.POWER, current**2 * 0.2, fan, ambient)
     shown += np.random.default_rng(3).normal(0.0, 0.3, shown.shape)
-    columns = {f"i{k + 1}_a": current[:, k] for k in range(9)} | {f"v{k + 1}_v": current[:, k] * 0.2 for k in range(9)}
-    columns |= {f"t{k + 1}_c": shown[:, k] for k in range(9)} | {"fan": fan, "ambient_c": ambient}
+    columns = columns_of(i=current, v=current * 0.2, t=shown) | {"fan": fan, "ambient_c": ambient}
     (tmp_path / "log.csv").write_text(log_text(time_s, columns))
     model = ns.fit(tmp_path / "log.csv", effects=["latent_heat"])
     for name, value in true.items():

@@ -19,6 +19,7 @@ from ninespring.model import native
 from ninespring.model.effects import Candidate, alloy
 from ninespring.model.models import Array, Model
 from ninespring.model.spec import RUN_AMBIENT, Free, Spec
+from plants import a_plant
 
 ALLOY = {"austenite_start_c": 48.0, "austenite_finish_c": 58.0, "martensite_start_c": 42.0, "martensite_finish_c": 32.0}
 """As it is declared; it transforms elsewhere, in a broad and narrow loop."""
@@ -31,13 +32,10 @@ def pulse(path: Path, seed: int, room_c: float = 22.0, logged_c: float = 19.0, w
     time_s = np.arange(0.0, 300.0, step_s)
     drive = 0.1 * np.exp(-0.5 * ((time_s - 20.0) / 5.5) ** 2)
     drive[drive < 0.004] = 0.0
-    plant = native.Plant(1, 1)
-    plant.set_effects(["latent_heat"])
-    plant.set_all({"heat_capacity_j_per_k": 0.3, "loss_w_per_k": 0.007, "latent_heat_j": 6.0, "command_power_w": 16.0})
-    plant.set_all({"austenite_start_c": 33.0, "austenite_finish_c": 49.0})
-    plant.set_all({"martensite_start_c": 47.0, "martensite_finish_c": 28.0})
-    plant.set_ambient(room_c)
-    plant.reset()
+    numbers = {"heat_capacity_j_per_k": 0.3, "loss_w_per_k": 0.007, "latent_heat_j": 6.0, "command_power_w": 16.0}
+    numbers |= {"austenite_start_c": 33.0, "austenite_finish_c": 49.0, "ambient_c": room_c}
+    numbers |= {"martensite_start_c": 47.0, "martensite_finish_c": 28.0}
+    plant = a_plant((1, 1), ["latent_heat"], numbers)
     plant.set_temperature(0, room_c + warm_k)
     shown = plant.simulate(time_s, native.COMMAND, drive[:, None], ambient_c=np.full(len(time_s), room_c))
     lasts = np.zeros(len(time_s))

@@ -14,7 +14,7 @@ from ninespring.io.logs import log_text, read_log
 from ninespring.io.statistics import rms
 from ninespring.model.models import Array, Model
 from ninespring.say.page import findings
-from two_heaters import levels
+from plants import columns_of, levels
 
 CAPACITY, LOSS, LINK, FULL_W, ROOM_C, NOISE_C = 2.0, 0.012, 0.004, 0.7, 21.0, 0.05
 
@@ -34,14 +34,10 @@ def two_heaters(folder: Path, runs: list[dict[str, float]], *, volts: bool = Fal
                 heat = own.get("gain", 1.0) * FULL_W * level[row]
                 true = true + 0.1 / CAPACITY * (heat - LOSS * (true - room) + LINK * (true[::-1] - true))
         shown = shown + own.get("read", 0.0) + rng.normal(0.0, NOISE_C, shown.shape)
-        columns = {f"u{k + 1}": level[:, k] for k in range(2)}
-        if volts:
-            current = np.sqrt(FULL_W * level / 0.2)
-            columns = {f"i{k + 1}_a": current[:, k] for k in range(2)}
-            columns |= {f"v{k + 1}_v": 0.2 * current[:, k] for k in range(2)}
-        columns |= {f"t{k + 1}_c": shown[:, k] for k in range(2)}
+        current = np.sqrt(FULL_W * level / 0.2)
+        drive = {"i": current, "v": 0.2 * current} if volts else {"u": level}
         path = folder / f"run{number + 1}.csv"
-        path.write_text(log_text(time_s, columns | {"ambient_c": np.full(600, ROOM_C)}))
+        path.write_text(log_text(time_s, columns_of(**drive, t=shown) | {"ambient_c": np.full(600, ROOM_C)}))
         out.append(path)
     return out
 

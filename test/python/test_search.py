@@ -26,7 +26,7 @@ from ninespring.io.recording import script_lines
 from ninespring.model import effects, native
 from ninespring.model.models import Array, Model, model_text, read_model
 from ninespring.model.spec import Spec
-from two_heaters import levels
+from plants import a_plant, columns_of, levels
 
 
 def commanded(path: Path, on: dict[str, dict[str, float]], seed: int = 0) -> Path:
@@ -34,16 +34,10 @@ def commanded(path: Path, on: dict[str, dict[str, float]], seed: int = 0) -> Pat
     rng = np.random.default_rng(seed)
     time_s = np.arange(600.0)
     drive = levels(rng)
-    plant = native.Plant(1, 2)
-    plant.set_all({"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.012, "orthogonal_w_per_k": 0.004})
-    plant.set_all({"command_power_w[1]": 0.8, "command_power_w[2]": 0.4})
-    plant.set_effects(on)
-    for values in on.values():
-        plant.set_all(values)
-    plant.reset()
+    numbers = {"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.012, "orthogonal_w_per_k": 0.004}
+    plant = a_plant((1, 2), on, numbers | {"command_power_w[1]": 0.8, "command_power_w[2]": 0.4})
     shown = plant.simulate(time_s, native.COMMAND, drive) + rng.normal(0.0, 0.05, (600, 2))
-    columns = {f"u{k + 1}": drive[:, k] for k in range(2)} | {f"t{k + 1}_c": shown[:, k] for k in range(2)}
-    path.write_text(log_text(time_s, columns | {"ambient_c": np.full(600, 20.0)}))
+    path.write_text(log_text(time_s, columns_of(u=drive, t=shown) | {"ambient_c": np.full(600, 20.0)}))
     return path
 
 
@@ -60,13 +54,10 @@ def pulsed(path: Path) -> Run:
     time_s = np.arange(0.0, 300.0, 0.5)
     drive = 0.1 * np.exp(-0.5 * ((time_s - 21.0) / 5.5) ** 2)
     drive[drive < 0.004] = 0.0
-    plant = native.Plant(1, 1)
-    plant.set_effects(["latent_heat", "sensor_lag"])
-    plant.set_all({"heat_capacity_j_per_k": 0.298, "loss_w_per_k": 0.007, "latent_heat_j": 7.0, "sensor_lag_s": 4.0})
-    plant.set_all({"austenite_start_c": 36.3, "austenite_finish_c": 50.0})
-    plant.set_all({"martensite_start_c": 35.5, "martensite_finish_c": 25.3, "command_power_w[1]": 15.7})
-    plant.set_ambient(20.6)
-    plant.reset()
+    numbers = {"heat_capacity_j_per_k": 0.298, "loss_w_per_k": 0.007, "latent_heat_j": 7.0, "sensor_lag_s": 4.0}
+    numbers |= {"austenite_start_c": 36.3, "austenite_finish_c": 50.0, "command_power_w[1]": 15.7}
+    numbers |= {"martensite_start_c": 35.5, "martensite_finish_c": 25.3, "ambient_c": 20.6}
+    plant = a_plant((1, 1), ["latent_heat", "sensor_lag"], numbers)
     shown = plant.simulate(time_s, native.COMMAND, drive[:, None], ambient_c=np.full(600, 20.6))
     shown += rng.normal(0.0, 0.1, shown.shape)
     path.write_text(log_text(time_s, {"u1": drive, "t1_c": shown[:, 0], "ambient_c": np.full(600, 24.5)}))
@@ -95,16 +86,11 @@ def with_one_after_the_other(found: search.Search, *names: str) -> Fit:
 def test_quick_heaters_with_slow_thermometers_are_not_taken_for_slow_ones_that_a_camera_sees(tmp_path: Path) -> None:
     """What heats a neighbour is as quick as the heaters are: the readings follow together, as if each were a mean of both."""
     time_s, drive = 2.0 * np.arange(600.0), levels(np.random.default_rng(3))
-    plant = native.Plant(1, 2)
-    plant.set_effects(["sensor_lag"])
-    plant.set_all(
-        {"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.1, "orthogonal_w_per_k": 0.02, "sensor_lag_s": 140.0}
-    )
-    plant.set_all({"command_power_w[1]": 7.0, "command_power_w[2]": 3.5})
-    plant.reset()
+    numbers = {"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.1, "orthogonal_w_per_k": 0.02, "sensor_lag_s": 140.0}
+    numbers |= {"command_power_w[1]": 7.0, "command_power_w[2]": 3.5}
+    plant = a_plant((1, 2), ["sensor_lag"], numbers)
     shown = plant.simulate(time_s, native.COMMAND, drive) + np.random.default_rng(4).normal(0.0, 0.1, (600, 2))
-    columns = {f"u{k + 1}": drive[:, k] for k in range(2)} | {f"t{k + 1}_c": shown[:, k] for k in range(2)}
-    (tmp_path / "log.csv").write_text(log_text(time_s, columns))
+    (tmp_path / "log.csv").write_text(log_text(time_s, columns_of(u=drive, t=shown)))
     found = diagnosis.diagnose(Array(1, 2), [read_log(tmp_path / "log.csv", 2)], model=heaters())
     (one,) = found.result["effects"]
     assert one["name"] == "sensor_lag" and one["parameters"]["sensor_lag_s"]["value"] == pytest.approx(140.0, rel=0.03)
@@ -271,13 +257,13 @@ def test_a_blur_over_more_than_the_nearest_is_found_as_it_is(make_log) -> None:
     (one,) = found.result["effects"]
     assert one["name"] == "optical_mixing" and found.result["unexplained"] is False
     # share and width of a long tail can stand for one another: what a spring sees of the next does not move
-    plants = [native.Plant(3, 3) for _ in range(2)]
-    for plant, numbers in zip(plants, (camera, found.model.parameters), strict=True):
-        plant.set_effects(["optical_mixing"])
-        plant.set_all({key: value for key, value in numbers.items() if key.startswith("optical_")})
-        plant.reset()
+    sees = []
+    for numbers in (camera, found.model.parameters):
+        own = {key: value for key, value in numbers.items() if key.startswith("optical_")}
+        plant = a_plant((3, 3), {"optical_mixing": own})
         plant.set_temperature(4, 120.0)
-    true, fitted = (plant.measured_c() - 20.0 for plant in plants)
+        sees.append(plant.measured_c() - 20.0)
+    true, fitted = sees
     assert fitted[1] / fitted[4] == pytest.approx(true[1] / true[4], rel=0.1)
     assert fitted[0] / fitted[4] == pytest.approx(true[0] / true[4], rel=0.1)
 
@@ -574,17 +560,14 @@ def test_a_run_that_begins_warm_needs_no_effect(tmp_path: Path) -> None:
     time_s = np.arange(600.0)
     drive = np.full((600, 2), 0.3)
     drive[200:400, 0], drive[300:500, 1] = 0.5, 0.1
-    plant = native.Plant(1, 2)
-    plant.set_all({"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.012, "orthogonal_w_per_k": 0.004})
-    plant.set_effects(["plate_conduction"])
-    plant.set_all({"plate_coupling_w_per_k": 0.01, "plate_heat_capacity_j_per_k": 60.0, "plate_loss_w_per_k": 0.02})
-    plant.reset()
+    values = {"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.012, "orthogonal_w_per_k": 0.004}
+    values |= {"plate_coupling_w_per_k": 0.01, "plate_heat_capacity_j_per_k": 60.0, "plate_loss_w_per_k": 0.02}
+    plant = a_plant((1, 2), ["plate_conduction"], values)
     for k in range(2):
         plant.drive(k, native.POWER, 0.3)
     plant.settle(1e6)
     shown = plant.simulate(time_s, native.POWER, drive) + rng.normal(0.0, 0.05, (600, 2))
-    columns = {f"i{k + 1}_a": drive[:, k] for k in range(2)} | {f"v{k + 1}_v": np.ones(600) for k in range(2)}
-    columns |= {f"t{k + 1}_c": shown[:, k] for k in range(2)} | {"ambient_c": np.full(600, 20.0)}
+    columns = columns_of(i=drive, v=np.ones_like(drive), t=shown) | {"ambient_c": np.full(600, 20.0)}
     path = tmp_path / "warm.csv"
     path.write_text(log_text(time_s, columns))
     run = read_log(path, 2)
@@ -593,8 +576,6 @@ def test_a_run_that_begins_warm_needs_no_effect(tmp_path: Path) -> None:
     base = base_spec(problem)
     plate = next(c for c in effects.candidates(scene_of(problem)) if c.effect == "plate_conduction")
     spec = base.with_effect(plate.effect, plate.free, (), "")
-    values = {"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.012, "orthogonal_w_per_k": 0.004}
-    values |= {"plate_coupling_w_per_k": 0.01, "plate_heat_capacity_j_per_k": 60.0, "plate_loss_w_per_k": 0.02}
     left = run.temperature_c - problem.simulate(spec, [values[f.key] for f in spec.free], 0)
     assert np.abs(left[100:200].mean(axis=0)).max() < 0.08
 

@@ -14,6 +14,7 @@ from ninespring.infer.scene import scene_of
 from ninespring.io.logs import read_log
 from ninespring.model import effects, native
 from ninespring.model.models import Array
+from plants import a_plant
 
 EDGES = {"edge_loss": {"edge_loss_fraction": 0.2}}
 LATENT = {"latent_heat": {"latent_heat_j": 7.0}}
@@ -23,10 +24,7 @@ WAKE = {"fan_wake": {"wake_w_per_k": 1.5e-3}}
 def astray(columns: dict[str, np.ndarray], extra: np.ndarray, effects: dict[str, dict[str, float]] = EDGES) -> None:
     """Add to the temperatures what heat beside that of the currents makes of the same array."""
     rows = len(columns["fan"])
-    plant = native.Plant(3, 3)
-    plant.set_effects(effects)
-    for values in effects.values():
-        plant.set_all(values)
+    plant = a_plant((3, 3), effects)
     time_s, fan, around = np.arange(float(rows)), columns["fan"], np.full(rows, 20.0)
     power = np.column_stack([columns[f"i{k + 1}_a"] ** 2 * 0.2 for k in range(9)])
     shown = []
@@ -154,11 +152,8 @@ def swinging_losses(columns: dict[str, np.ndarray]) -> None:
     power = np.column_stack([columns[f"i{k + 1}_a"] ** 2 * 0.2 for k in range(9)])
     shown = []
     for size in (0.0, 0.33):
-        plant = native.Plant(3, 3)
-        plant.set_effects(MISMATCH)
-        plant.set_all({**MISMATCH["spring_mismatch"], "ambient_c": 20.0})
+        plant = a_plant((3, 3), MISMATCH, {"ambient_c": 20.0})
         still, blown = plant.get("loss_w_per_k"), plant.get("loss_fan_w_per_k")
-        plant.reset()
         out = np.empty((rows, 9))
         for row in range(rows):
             swing = 1.0 + size * np.sin(2.0 * np.pi * row / 660.0)

@@ -17,6 +17,7 @@ from ninespring.io.logs import log_text, read_log
 from ninespring.io.logs.mending import RUN_IN_S
 from ninespring.model import native
 from ninespring.model.models import Array
+from plants import a_plant, columns_of, switched
 
 ROWS = 700
 Change = Callable[[np.ndarray], None]
@@ -33,21 +34,12 @@ def array_log(
 ) -> tuple[Problem, Fit]:
     """Write a 3 x 3 log with changes to the heat, the thermometers and the resistances that nothing logs; fit it."""
     rng = np.random.default_rng(2)
-    time_s, watts = np.arange(float(ROWS)), np.full((ROWS, 9), 0.05)
-    for k in range(9):
-        at = int(rng.integers(5, 40))
-        while at < ROWS:
-            hold = int(rng.integers(30, 120))
-            watts[at : at + hold, k] = 0.05 if rng.random() < 0.4 else rng.uniform(0.2, 0.65)
-            at += hold
+    time_s, watts = np.arange(float(ROWS)), switched(rng, ROWS, 0.05, 0.2, 0.65)
     fan = ((time_s // 200) % 2 == 1).astype(float)
     drive(watts)
     given = watts.copy()
     heat(given)
-    plant = native.Plant(3, 3)
-    plant.set_effects(["resistance_phase", "resistance_temperature"] if effects else ["resistance_phase"])
-    plant.set_all(effects or {})
-    plant.reset()
+    plant = a_plant((3, 3), {"resistance_phase": {}} | ({"resistance_temperature": effects} if effects else {}))
     traced = plant.copy().trace(time_s, native.POWER, given, fan, np.full(ROWS, 20.0))
     ohm = plant.readings(time_s, given, fan, np.full(ROWS, 20.0)) * (1.0 + 0.04 * np.linspace(-1, 1, 9))
     ohms(ohm)
@@ -55,8 +47,7 @@ def array_log(
     thermometers(shown)
     current = np.sqrt(watts / ohm)
     voltage = watts / current + rng.normal(0.0, 3e-4, (ROWS, 9))
-    columns = {f"i{k + 1}_a": current[:, k] for k in range(9)} | {f"v{k + 1}_v": voltage[:, k] for k in range(9)}
-    columns |= {f"t{k + 1}_c": shown[:, k] for k in range(9)} | {"fan": fan, "ambient_c": np.full(ROWS, 20.0)}
+    columns = columns_of(i=current, v=voltage, t=shown) | {"fan": fan, "ambient_c": np.full(ROWS, 20.0)}
     logged = np.delete(np.arange(ROWS), gap)
     path.write_text(log_text(time_s[logged], {name: one[logged] for name, one in columns.items()}, decimals=5))
     problem = Problem(Array(), [read_log(path, 9)])
