@@ -71,6 +71,18 @@ class Drive:
     done: float
     """Mean austenite of the driven springs over all the time that they are on."""
 
+    @staticmethod
+    def phases(austenite: np.ndarray, pattern: np.ndarray, since_s: np.ndarray, never_s: float) -> dict[str, float]:
+        """Return what austenite, (rows, springs), says of a pattern's drive: it is on in the rows with a time `since_s`, the last."""
+        on, off = austenite[-len(since_s) :, pattern], austenite[:, ~pattern]
+        heated = np.minimum.reduce(on, axis=1) >= TRANSFORMED
+        return {
+            "held": float(on[len(on) // 2 :].mean()),
+            "heating_s": float(since_s[np.argmax(heated)]) if heated.any() else never_s,
+            "undriven": float(off.max()) if off.size else 0.0,
+            "done": float(on.mean()),
+        }
+
 
 def patterns(springs: int) -> list[np.ndarray]:
     """Return what is tried: all but the middle one, and the first alone."""
@@ -89,15 +101,10 @@ def drive(plant: native.Plant, lines: str, pattern: np.ndarray) -> Drive:
     plant = plant.copy()
     plant.reset()
     temperature, austenite = native.chip_drive(plant, lines, list(pattern), on, on)
-    heated = np.minimum.reduce(austenite[:, pattern], axis=1) >= TRANSFORMED
-    off = austenite[:, ~pattern]
     return Drive(
-        float(austenite[on // 2 :, pattern].mean()),
-        float(np.argmax(heated)) if heated.any() else float(on),
-        float(temperature.max()),
-        plant.get("austenite_finish_c") + ENOUGH_K,
-        float(off.max()) if off.size else 0.0,
-        float(austenite[:on, pattern].mean()),
+        hottest_c=float(temperature.max()),
+        enough_c=plant.get("austenite_finish_c") + ENOUGH_K,
+        **Drive.phases(austenite, pattern, np.arange(float(on)), float(on)),
     )
 
 

@@ -71,13 +71,11 @@ def _delayed(power: np.ndarray, time_s: np.ndarray, delay_s: float) -> np.ndarra
 
 def thinned(problem: Problem, columns: np.ndarray) -> np.ndarray:
     """Return columns (count, n) with every THIN rows as one sample, unit noise kept: causes are slower than rows."""
-    out, begin = [], 0
-    for mask in problem.mask:
+    out = []
+    for mask, part in zip(problem.mask, problem.by_run(columns), strict=True):
         whole = np.zeros((*mask.shape, columns.shape[1]))
-        end = begin + int(mask.sum())
-        whole[mask] = columns[begin:end]
+        whole[mask] = part
         out.append(thin(whole))
-        begin = end
     return np.concatenate(out)
 
 
@@ -116,7 +114,7 @@ def _declared_slopes(problem: Problem, fit: Fit) -> np.ndarray:
     """Return what the declared numbers move of the readings, nothing taken out, (count, numbers)."""
     taken, problem.unnamed = problem.unnamed, None
     numbers = [k for k, free in enumerate(fit.spec.free) if free.effect is None]
-    slopes = problem.jacobian(fit.spec, fit.values, problem.predictions(fit.spec, fit.values), numbers)
+    slopes = problem.slopes(fit, numbers)
     problem.unnamed = taken
     return slopes[:, np.linalg.norm(slopes, axis=0) > 1e-6]
 

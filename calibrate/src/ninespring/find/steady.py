@@ -226,7 +226,11 @@ def diagnose_states(
         logs=[],
         baseline=results.Baseline(rmse_c=rmse, holdout_rmse_c=rmse, noise_c=1.0),
         effects=[_adopted(best)] if best else [],
-        rivals=[_rival(array, declared, states[0], best, one) for one in useful[1:] if _near(best, one)],
+        rivals=[
+            _rival(array, declared, states[0], best, one)
+            for one in useful[1:]
+            if best.told.evidence - one.told.evidence < TOLD_APART
+        ],
         after=results.After(
             rmse_c=after.rmse_c if after else rmse, holdout_rmse_c=after.holdout_rmse_c if after else rmse
         ),
@@ -237,10 +241,6 @@ def diagnose_states(
         identifiability=results.Identifiability(not_identifiable=[], at_bounds=[], correlated=[]),
         warnings=[],
     )
-
-
-def _near(best: _Tried, one: _Tried) -> bool:
-    return best.told.evidence - one.told.evidence < TOLD_APART
 
 
 def _adopted(one: _Tried) -> results.Effect:

@@ -103,13 +103,8 @@ def find(problem: Problem, fit: Fit, say: Callable[[str], None] = lambda text: N
     factor = fit_factor(problem, fit)
     found = UnknownHeat([], [], [], usual_w)
     jacobian = fit.jacobian if fit.jacobian is not None else np.zeros((problem.count, 0))
-    begin = 0
-    for r, run in enumerate(problem.runs):
+    for r, (run, slopes) in enumerate(zip(problem.runs, problem.by_run(jacobian), strict=True)):
         say(f"unknown heat in run {r + 1}")
-        mask = problem.mask[r]
-        count = int(mask.sum())
-        slopes = jacobian[begin : begin + count]
-        begin += count
         events = _events_of(problem, fit, r, slopes, factor, typical, usual_w)
         watts = np.zeros((len(run.time_s), run.springs))
         since = run.time_s - run.time_s[0]

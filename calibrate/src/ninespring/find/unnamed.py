@@ -113,14 +113,12 @@ Beside = tuple[Search, Found, list[Hidden]]
 
 def _starts(problem: Problem) -> list[np.ndarray]:
     """Return what errors of the first readings do, as columns (count, springs)."""
-    out, begin = [], 0
-    for mask, response in zip(problem.mask, problem.start_response, strict=True):
-        end = begin + int(mask.sum())
+    out = []
+    for r, response in enumerate(problem.start_response):
         if response is not None:
             column = np.zeros((problem.count, response.shape[1]))
-            column[begin:end] = response
+            problem.by_run(column)[r][:] = response
             out.append(column)
-        begin = end
     return out
 
 
@@ -303,7 +301,7 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
     """Return unnamed causes with their sizes beside a fit's numbers, and the nats by which each is needed there."""
     problem.leave_out(None, problem.heat)
     bare = problem.evaluate(fit)
-    slopes = problem.jacobian(fit.spec, fit.values, problem.predictions(fit.spec, fit.values))
+    slopes = problem.slopes(fit)
     slopes = slopes[:, np.linalg.norm(slopes, axis=0) > 1e-6]
     columns = np.column_stack([one.column for one in hidden])
     matrix = np.column_stack([columns, slopes])
@@ -361,9 +359,7 @@ def _with_fewer(problem: Problem, first: Search, final: Fit, kinds: Sequence[Cau
         for effect in names:
             if effect not in some:
                 fit = first.reduced(fit, effect)
-        if fit.jacobian is None:
-            shown = problem.predictions(fit.spec, fit.values)
-            fit = replace(fit, jacobian=problem.jacobian(fit.spec, fit.values, shown))
+        fit = problem.with_slopes(fit)
         if not (grown := find(problem, fit, kinds, (), most=1)):
             continue
         problem.leave_out(grown[0].column)
@@ -489,10 +485,7 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
             break
         begun = problem.simulations
         hidden = taken_out(problem, final, hidden)
-        final = problem.evaluate(final)
-        if final.jacobian is None:
-            shown = problem.predictions(final.spec, final.values)
-            final = replace(final, jacobian=problem.jacobian(final.spec, final.values, shown))
+        final = problem.with_slopes(problem.evaluate(final))
         searched = 0 if out is None else len(hidden)
         grown = find(problem, final, [*kinds, *_named(problem, first, final)], hidden, searched=searched)
         if len(grown) == searched:

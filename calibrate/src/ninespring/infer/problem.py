@@ -565,12 +565,20 @@ class Problem:
         parts = zip(self.rows, self.by_run(vector), self.by_run(out), strict=True)
         return np.concatenate([rows.between(part, colour, gone) for rows, part, gone in parts])
 
+    def slopes(self, fit: Fit, columns: Sequence[int] | None = None) -> np.ndarray:
+        """Return d(residual vector)/d(inner coordinate) at a fit's numbers."""
+        return self.jacobian(fit.spec, fit.values, self.predictions(fit.spec, fit.values), columns)
+
+    def with_slopes(self, fit: Fit) -> Fit:
+        """Return a fit with its slopes."""
+        return fit if fit.jacobian is not None else replace(fit, jacobian=self.slopes(fit))
+
     def plain_slopes(self, fit: Fit) -> np.ndarray:
         """Return a fit's slopes with no error whitened out, (count, free)."""
         if fit.jacobian is not None and self.colour is None:
             return self._whitened(fit.jacobian, back=True)
         with self.as_white():
-            return self.jacobian(fit.spec, fit.values, self.predictions(fit.spec, fit.values))
+            return self.slopes(fit)
 
     def add_errors(self, fit: Fit) -> None:
         """Compute the covariance at the fit, with the residual's size and autocorrelation taken into account.
@@ -578,7 +586,7 @@ class Problem:
         A sandwich: J'J inverse around the long-run covariance of J'r over blocks in time (all springs of a block
         together), never less than what white noise alone would give.
         """
-        jac = fit.jacobian = self.jacobian(fit.spec, fit.values, self.predictions(fit.spec, fit.values))
+        jac = fit.jacobian = self.slopes(fit)
         used = [k for k, f in enumerate(fit.spec.free) if f.key not in fit.stuck]
         covariance = np.full((jac.shape[1], jac.shape[1]), 0.0)
         fit.factor = self.alike([left / noise for left, noise in zip(fit.residual, self.noise, strict=True)])

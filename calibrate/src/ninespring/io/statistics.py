@@ -132,9 +132,7 @@ def correlation_factor(series: Sequence[np.ndarray], lags: int) -> float:
 
 def block_means(series: np.ndarray, width: int, starts: Sequence[int] = (0,)) -> tuple:
     """Return means over blocks of `width` rows, their counts and first rows: (b, columns), (b, columns), (b,)."""
-    rows = len(series)
-    bounds = [*starts, rows]
-    begins = np.concatenate([np.arange(a, b, width) for a, b in zip(bounds[:-1], bounds[1:], strict=True)])
+    begins = np.concatenate([np.arange(a, b, width) for a, b in itertools.pairwise([*starts, len(series)])])
     good = np.isfinite(series)
     total = np.add.reduceat(np.where(good, series, 0.0), begins, axis=0)
     count = np.add.reduceat(good.astype(float), begins, axis=0)

@@ -49,21 +49,12 @@ def judge(model: Model, log: Path, springs_on: str) -> Judged:
     current = run.current_a if run.current_a is not None else run.drive
     flowing = np.flatnonzero((current > FLOWING_A).any(axis=1))
     first = int(flowing[0]) if flowing.size else 0
-    on, measured = austenite[first:][:, pattern], run.temperature_c
-    heated = np.minimum.reduce(on, axis=1) >= tried.TRANSFORMED
-    off = austenite[:, ~pattern]
-    plant = best_plant(model)
-    left = believed(run) - measured
+    left = believed(run) - run.temperature_c
     each = np.sqrt(np.nanmean(left**2, axis=0))
     return Judged(
-        held=float(on[len(on) // 2 :].mean()),
-        heating_s=float(run.time_s[first + int(np.argmax(heated))] - run.time_s[first])
-        if heated.any()
-        else run.duration_s,
-        hottest_c=float(np.nanmax(measured)),
-        enough_c=plant.get("austenite_finish_c") + tried.ENOUGH_K,
-        undriven=float(off.max()) if off.size else 0.0,
-        done=float(on.mean()),
+        **tried.Drive.phases(austenite, pattern, run.time_s[first:] - run.time_s[first], run.duration_s),
+        hottest_c=float(np.nanmax(run.temperature_c)),
+        enough_c=best_plant(model).get("austenite_finish_c") + tried.ENOUGH_K,
         error_c=rms([left]),
         worst_spring=int(np.nanargmax(each)) + 1,
         worst_c=float(np.nanmax(each)),
