@@ -159,8 +159,7 @@ TEST(a_switch_that_welds_while_the_bus_hangs_is_cut)
     }
 }
 
-/* Contacts that chatter and springs that are plugged in give no current that their duty does not.
- */
+/* Contacts that chatter, springs that are plugged in give no current that their duty does not. */
 TEST(a_spring_that_is_plugged_in_leaves_the_supply)
 {
     rig mega;

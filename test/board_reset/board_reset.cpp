@@ -135,8 +135,7 @@ TEST(whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot)
 }
 
 /* A bit of RAM, in what the user set and in what the controller made of it: never driven by it for
- * longer than two passes, never saved, and afterwards all is as it was saved and nothing is known.
- */
+ * longer than two passes, never saved; afterwards all is as it was saved and nothing is known. */
 TEST(a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so)
 {
     struct place {

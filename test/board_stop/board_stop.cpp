@@ -175,8 +175,7 @@ TEST(stops_whatever_bit_of_an_output_has_turned_over)
     }
 }
 
-/* A part that has lost its clock, or a serial port that is set otherwise: nothing else may notice.
- */
+/* A part that has lost its clock, a serial port that is set otherwise: nothing else may notice. */
 TEST(what_keeps_the_board_going_is_written_anew_within_a_tick)
 {
     constexpr unsigned PRR0 = 0x64, PRR1 = 0x65, UCSR0B = 0xC1, UCSR0C = 0xC2, UBRR0L = 0xC4;

@@ -530,8 +530,7 @@ TEST(a_contact_takes_voltage_and_keeps_its_heat)
     TEST_ASSERT_EQUAL_DOUBLE(plant_current_a(plant, 1), plant_current_a(plant, 0));
 }
 
-/* Which is why it has no loss of its own, and is looked for only where there are several springs.
- */
+/* Which is why it has no loss of its own, and is looked for only where springs are several. */
 TEST(a_holder_that_loses_heat_shows_as_one_that_does_not)
 {
     const double g = 4e-3, capacity = 0.8, loss = 3e-3, part = g / (g + loss);
@@ -572,8 +571,7 @@ TEST(a_holder_that_is_switched_on_is_as_warm_as_the_room_is_by_then)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 35.0, at(0));
 }
 
-/* Explicit steps go by the faster of both, or rest does not last: it grows to what a step may err.
- */
+/* Explicit steps go by the faster of both, or rest does not last: it grows as a step may err. */
 TEST(a_spring_and_a_holder_that_weighs_little_or_much_stay_at_rest)
 {
     static const double capacity[] = {1e-2, 3.0}, coupling[] = {0.5, 5.0};

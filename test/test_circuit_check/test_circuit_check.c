@@ -402,8 +402,7 @@ TEST(what_follows_is_held_against_all_that_goes_with_the_duty)
     }
 }
 
-/* One window is enough to doubt it: 120 steps, how much of the sweep is followed, what is beyond.
- */
+/* One window is enough to doubt it: 120 steps, how much of the sweep is followed, what is more. */
 TEST(a_window_of_no_circuit_is_not_sound)
 {
     static const struct {
@@ -528,8 +527,7 @@ TEST(the_drop_counts_and_what_is_found_stays_found)
     }
 }
 
-/* A voltage that stands though the sweep moves it by 3.2 mV, more than half a step of its register.
- */
+/* A voltage that stands though the sweep moves it by 3.2 mV, above half a step of its register. */
 TEST(voltage_that_should_move_by_more_than_half_a_step_is_frozen)
 {
     int window = 0;

@@ -102,8 +102,7 @@ TEST(a_sensor_that_was_wrong_from_the_first_may_be_another_one_after_a_clear)
     }
 }
 
-/* An open spring shows nothing of what its duty should bring: soldered and cleared, it is driven.
- */
+/* An open spring shows nothing of what its duty should bring: soldered, cleared, it is driven. */
 TEST(what_is_no_share_of_a_supply_is_not_what_it_showed_before)
 {
     for (unsigned doubted = 0; doubted < 2; doubted++) {
@@ -156,9 +155,7 @@ TEST(of_too_few_volts_nothing_is_what_it_showed_before)
     TEST_ASSERT_EQUAL_HEX(1, rounds(3, 1, HEATS_MV, 1.0f, 0.0f));
 }
 
-/* However slow: what is soldered stays what it is, and its share is no more learnt after 255
- * windows.
- */
+/* However slow: what is soldered stays what it is; no share is learnt after 255 windows. */
 TEST(a_drift_is_found_however_slow)
 {
     for (unsigned slow = 0; slow < 2; slow++) {

@@ -405,8 +405,7 @@ TEST(what_moves_otherwise_than_a_lie_is_compared_with_anew)
     }
 }
 
-/* Of a supply that is believed a quarter higher it showed 0.8; with another drop nothing is known.
- */
+/* Of a supply that is believed a quarter higher it showed 0.8; of another drop nothing is known. */
 TEST(another_belief_of_the_supply_makes_another_share)
 {
     static const struct {

@@ -447,8 +447,7 @@ TEST(what_was_heated_is_not_cold_because_someone_says_so)
     expect_said(" degC or more]\r\n");
     TEST_ASSERT_EQUAL_UINT(1, answers());
     TEST_ASSERT_INT16_WITHIN(128, before_c7, controller_temperature_c7(&controller, 1));
-    /* a belief above the account of heat is no heat that was given just now, nor to its neighbour
-     */
+    /* a belief above the account of heat is no heat that was given, nor to its neighbour */
     thermal_model_set_temperature(&controller.model, 1, 90 * 128);
     thermal_model_set_temperature(&controller.model, 2, 60 * 128);
     temperature_ceiling_raise(&controller.ceiling, &controller.model);
@@ -457,8 +456,7 @@ TEST(what_was_heated_is_not_cold_because_someone_says_so)
     expect_said("[spring 3 was heated by others: 60 degC or more]\r\n");
 }
 
-/* Whatever order a restore has, what it ends with is the same, and in between nothing is refused.
- */
+/* Whatever order a restore has, it ends with the same, and in between nothing is refused. */
 TEST(a_listing_pasted_backwards_makes_it_the_same)
 {
     static char listing[32768];

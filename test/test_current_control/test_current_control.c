@@ -396,8 +396,7 @@ TEST(another_drop_is_taken_from_every_trim)
     TEST_ASSERT_EQUAL_INT32(-most, control.channel[8].trim_q24);
 }
 
-/* A circuit that nothing is declared of is given a step in 65536 a milliampere: it still answers.
- */
+/* A circuit of which nothing is declared is given a step in 65536 a milliampere: it answers. */
 TEST(no_resistance_at_all_gives_the_least_there_is)
 {
     parameters.shunt_mohm = parameters.wiring_mohm = 0;
@@ -456,8 +455,7 @@ TEST(a_reading_counts_up_to_its_end)
     TEST_ASSERT_GREATER_THAN_INT32(taken(10, -4085), taken(10, -4095));
 }
 
-/* The same by hand for the declared circuit: 2684 millionths of a step, 180 mohm, 12.3 % of drop.
- */
+/* The same by hand for the declared circuit: 2684 millionths of a step, 180 mohm, 12.3 % drop. */
 TEST(a_new_one_is_off_and_has_the_numbers_of_its_circuit)
 {
     memset(owned.behind, 0xA5, sizeof owned.behind);

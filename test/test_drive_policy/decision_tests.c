@@ -342,8 +342,7 @@ TEST(heating_slows_to_a_level_and_keeps_what_waits)
 }
 
 /* Nothing is known: it waits and says so, or looks with 2 A, where its own numbers would tell and
- * have not been asked: from its first turn on, whether it is asked for just now or heats already.
- */
+ * have not been asked: from its first turn on, whether it is asked for now or heats already. */
 TEST(what_is_not_known_waits_or_looks)
 {
     for (unsigned i = 0; i < 8; i++) {
@@ -648,8 +647,7 @@ TEST(who_is_warmer_lets_the_colder_heat_while_few_wait)
 }
 
 /* An undriven one, by how hot it may be (2 sd, and those of 0.25 of its rise), 6 s ahead, over the
- * last 5 K below 5 K below austenite start. One that was just released counts once it has cooled.
- */
+ * last 5 K below 5 K below austenite start. One that was released counts once it has cooled. */
 TEST(undriven_spring_is_as_severe_as_hot_as_it_comes)
 {
     static const struct {
@@ -863,8 +861,7 @@ TEST(each_limit_is_said_where_it_cuts)
     }
 }
 
-/* Open, too: no current above the limit, said, and by its own temperature alone; a boost is none.
- */
+/* Open, too: no current above the limit, said, by its own temperature alone; a boost is none. */
 TEST(open_is_derated_by_its_own_temperature)
 {
     static const struct {

@@ -346,8 +346,7 @@ TEST(a_record_of_a_later_version_says_what_was_dropped)
     TEST_ASSERT_EQUAL_UINT16(16, loaded.controller.safety.maximum_on_s);
 }
 
-/* Whole by its CRC, but its last entry claims more than there is; and one that is cut in its head.
- */
+/* Whole by its CRC, but its last entry claims more than there is; and one that is cut at once. */
 TEST(an_entry_that_leaves_the_record_is_not_read)
 {
     static const uint8_t entries[] = {50, 2, 0x18, 0xFC, 26, 0xFD, 1, 2};

@@ -304,8 +304,7 @@ TEST(look_tells_a_phase_and_a_temperature_evenly_over_its_width)
     }
 }
 
-/* A look that tells nothing, by noise or a contact that comes and goes, heats by 3 K and no more.
- */
+/* A look that tells nothing, by noise or a contact that comes and goes, heats by 3 K at most. */
 TEST(look_that_tells_nothing_ends)
 {
     static const double hottest_c[] = {122.0, 124.0};

@@ -76,8 +76,7 @@ TEST(reading_is_the_mean_of_enough_of_them)
     }
 }
 
-/* Not below 0, nor beyond what a sum of 15 holds; eight after a jump of the current are left out.
- */
+/* Not below 0, nor beyond what a sum of 15 holds; eight after a jump of current are left out. */
 TEST(readings_that_no_sensor_gives_are_left_out)
 {
     static const struct {

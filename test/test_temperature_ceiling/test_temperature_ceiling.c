@@ -427,8 +427,7 @@ TEST(power_of_a_duty_is_of_the_declared_circuit)
     }
 }
 
-/* Nine tenths: the rise that trips the ceiling over the one that trips the model; and its own end.
- */
+/* Nine tenths: the rise that trips the ceiling over the one that trips the model; and its end. */
 TEST(it_trips_a_ninth_above_the_rise_that_trips_the_model)
 {
     static const int16_t ambient_c[] = {0, 20, 35};
@@ -627,8 +626,7 @@ TEST(a_hotter_model_raises_it_and_a_colder_one_does_not)
     }
 }
 
-/* Until something was given the air is as it is now: springs that are said to be as warm are cold.
- */
+/* Until something was given the air is as it is now: springs said to be as warm are cold. */
 TEST(air_that_is_told_to_be_warmer_is_no_heat)
 {
     run(0.0f, 0, 6.0f);

@@ -58,8 +58,7 @@ static int16_t c7(double temperature_c)
     return (int16_t)(temperature_c * 128.0);
 }
 
-/* ---- figures by hand ---------------------------------------------------------------------------
- */
+/* ---- figures by hand ---- */
 
 /* 5.8 mW/K x 50 K x 1.2, and 1.108e-4 m2 sigma (343.15^4 - 293.15^4) = 40.71 mW. All else that a
  * network has against another integration: test/host_fixed_vs_double. */
@@ -103,8 +102,7 @@ TEST(air_quicker_than_a_step_does_not_ring)
     TEST_ASSERT_TRUE(before > c7(37));
 }
 
-/* ---- phase -------------------------------------------------------------------------------------
- */
+/* ---- phase ---- */
 
 /* Liang and Rogers: 78, 88 and 68, 98: halfway up at 93, halfway down at 73; and so much higher
  * where a spring's loop is shifted. */
@@ -210,8 +208,7 @@ TEST(power_to_hold_holds)
     TEST_ASSERT_TRUE(thermal_model_power_to_hold_uw(&model, 4, c7(0)) < 0);
 }
 
-/* ---- conservation, symmetry --------------------------------------------------------------------
- */
+/* ---- conservation, symmetry ---- */
 
 TEST(no_heat_from_nothing)
 {
@@ -229,8 +226,7 @@ TEST(no_heat_from_nothing)
     TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
 }
 
-/* ---- an effect at zero is no effect ------------------------------------------------------------
- */
+/* ---- an effect at zero is no effect ---- */
 
 TEST(an_absent_effect_leaves_no_trace)
 {
@@ -271,8 +267,7 @@ TEST(an_absent_effect_leaves_no_trace)
     }
 }
 
-/* ---- corners -----------------------------------------------------------------------------------
- */
+/* ---- corners ---- */
 
 static void corner(unsigned bits)
 {
@@ -357,8 +352,7 @@ TEST(too_much_power_counts_as_the_highest)
     }
 }
 
-/* ---- refusals ----------------------------------------------------------------------------------
- */
+/* ---- refusals ---- */
 
 static void refused(thermal_model_status_t status, uint16_t row)
 {

@@ -217,8 +217,7 @@ static void begin_as_declared(run_case_t *run, double seconds)
 /* Each spring of one array has something else: capacity, loss and transformation as far off as is
  * tolerated; coefficients in print, whatever the change; a contact that steps or ages; a noise that
  * stays for a second. None of that is lost phase: all nine are heated for it ten times in a quarter
- * of an hour at the most, on average of six noises (one run says little: 2 to 34), and lose none.
- */
+ * of an hour at most, on average of six noises (one run says little: 2 to 34), and lose none. */
 #define NOISES 6
 TEST(springs_are_within_their_bounds_and_nothing_else_is_taken_for_lost_phase)
 {

@@ -124,8 +124,7 @@ static void draw_spring(draw_t *draw, const world_spring_t *batch, world_spring_
     alloy->austenite_start_c += up_k * (batch->alloy.austenite_start_c + near_one(draw, own) - 2.0);
     alloy->martensite_finish_c = alloy->martensite_start_c - down_k * near_one(draw, 1.0);
     alloy->austenite_finish_c = alloy->austenite_start_c + up_k * near_one(draw, 1.0);
-    /* A sound INA219 (data sheet: 0.2 % typical, 1 % shunt; 0.1 mV over 0.1 ohm) and sound crimps.
-     */
+    /* A sound INA219 (data sheet: 0.2 % typical, 1 % shunt; 0.1 mV over 0.1 ohm), sound crimps. */
     spring->sensor.current_gain = random_uniform(&draw->random, 0.99, 1.01);
     spring->sensor.voltage_gain = random_uniform(&draw->random, 0.998, 1.002);
     spring->sensor.current_offset_a = random_uniform(&draw->random, -0.001, 0.001);
@@ -355,8 +354,7 @@ static double convection(world_convection_t law, double rise_k, double sink_c, d
     return moved <= 1.0 ? moved * free : cbrt(free * free * free + moved * moved * moved - 1.0);
 }
 
-/* Still air carries heat off a thin wire a little better the hotter it is; moving air as it comes.
- */
+/* Still air carries heat off a thin wire a little better the hotter it is; moving air does not. */
 static void weigh_convection(world_t *world)
 {
     double sink_c = world->parameters.air_w_per_k > 0.0 ? world->air_c : world->ambient_c;

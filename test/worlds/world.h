@@ -101,8 +101,7 @@ void world_parameters_default(world_parameters_t *parameters);
 
 /* Moves everything that a specimen may have otherwise within +- tolerance of what it is, partly for
  * the whole array (one batch), partly for each spring; transformation temperatures by that share of
- * their band's width. Also draws the sensors' and contacts' ordinary imperfections, and the seed.
- */
+ * their band's width. Also draws the sensors' and contacts' imperfections, and the seed. */
 void world_draw(world_parameters_t *parameters, uint64_t seed, double tolerance);
 
 /* NULL if and only if memory or the parameters do not allow it: rows x columns outside
