@@ -365,10 +365,7 @@ class BoardSource(Source):
                 level[int(spring[1]) - 1] = 0
             elif one.startswith(ALL_OFF):
                 level = [0] * len(level)
-        shown = [
-            re.sub(r"fault (\d+) \w+", lambda match: f"{words.FAULTS.get(int(match[1]), match[0])}", one)
-            for one in faults
-        ]
+        shown = [re.sub(r"fault (\d+) \w+", lambda it: words.FAULTS.get(int(it[1]), it[0]), one) for one in faults]
         self._change(
             bounds_c=[one and [one.low_c, one.high_c] for one in each],
             phase=[one and one.austenite for one in each],

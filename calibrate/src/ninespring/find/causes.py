@@ -196,10 +196,8 @@ def _often(windows: Sequence[Cause], every: int) -> list[Cause]:
             whole = np.column_stack([bump(*times, len(profile)) for times in about])
             part = np.add.reduceat(whole, one.edges[:-1], axis=0) / np.diff(one.edges)[:, None]
             columns.append(between @ part)
-        merged = [
-            next((p.profiles[r] for p in parts if p.profiles[r] is not None), None)
-            for r in range(len(parts[0].profiles))
-        ]
+        of_runs = zip(*(part.profiles for part in parts), strict=True)
+        merged = [next((one for one in profiles if one is not None), None) for profiles in of_runs]
         thin_columns = _coming_and_going(np.column_stack(columns)).astype(np.float32)
         out.append(Cause(kind, text, tuple(merged), thin_columns, bumps=tuple(bumps)))
     return out

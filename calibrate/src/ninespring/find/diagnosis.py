@@ -597,10 +597,8 @@ def _by_least_squares(case: _Case) -> search.Search:
     problem.take_for(None)
     case.base = case.declared
     case.search = search.Search(problem, case.search.candidates, case.base, case.progress)
-    final, *others = [
-        problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3)
-        for fit in (case.final, *(fit for _, fit in case.contenders))
-    ]
+    fits = [case.final, *(fit for _, fit in case.contenders)]
+    final, *others = [problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3) for fit in fits]
     case.contenders = [(effect, fit) for (effect, _), fit in zip(case.contenders, others, strict=True)]
     case.final = _finish(problem, final)
     case.without = {effect: case.search.reduced(case.final, effect) for effect in case.adopted}
@@ -729,7 +727,7 @@ def _warned(
 
 def _counts(one: unnamed.Hidden) -> bool:
     """Return whether a cause without a name is told: it can be, and a board would measure as much."""
-    return one.possible and (one.cause.kind in unnamed.UNITS or abs(one.size) >= LEAST_PART)
+    return one.possible and (one.cause.kind in unnamed.UNIT or abs(one.size) >= LEAST_PART)
 
 
 def identifiability_of(fit: Fit) -> results.Identifiability:

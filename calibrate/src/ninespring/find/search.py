@@ -245,10 +245,7 @@ class Search:
         """
         flexible = {c.effect for c in self.candidates if c.flexible}
         shared = flexible & set(one.spec.effects) & set(other.spec.effects)
-        bends = [
-            any(self.is_flexible(fit, effect) for effect in fit.spec.effects if effect not in shared)
-            for fit in (one, other)
-        ]
+        bends = [any(self.is_flexible(fit, name) for name in set(fit.spec.effects) - shared) for fit in (one, other)]
         return TOLD_APART * (bends[0] - bends[1])
 
     def holds_out(self, better: Fit, other: Fit) -> bool:

@@ -204,13 +204,9 @@ def diagnose_states(
         tried.append(_tried(array, declared, effect, states, watched, before))
     tried.sort(key=lambda one: one.told.holdout_rmse_c)
     rmse = rms([before])
-    useful = [
-        one
-        for one in tried
-        if one.told.evidence is not None and one.told.evidence > 2.0 and one.told.holdout_rmse_c < 0.7 * rmse
-    ]
+    useful = [one for one in tried if (one.told.evidence or 0.0) > 2.0 and one.told.holdout_rmse_c < 0.7 * rmse]
     best = useful[0] if useful else None
-    after = best.told if best else None
+    after_c, holdout_c = (best.told.rmse_c, best.told.holdout_rmse_c) if best else (rmse, rmse)
     note = f"{len(before)} numbers: no noise can be estimated; 1 degC is assumed (the table gives whole degrees)"
     cases = [
         results.Case(
@@ -231,10 +227,8 @@ def diagnose_states(
             for one in useful[1:]
             if best.told.evidence - one.told.evidence < TOLD_APART
         ],
-        after=results.After(
-            rmse_c=after.rmse_c if after else rmse, holdout_rmse_c=after.holdout_rmse_c if after else rmse
-        ),
-        unexplained=bool((after.rmse_c if after else rmse) > 3.0),
+        after=results.After(rmse_c=after_c, holdout_rmse_c=holdout_c),
+        unexplained=bool(after_c > 3.0),
         residual=results.Residual(autocorrelation_lag1=0.0, depends_on=[], note=note),
         candidates=[one.told for one in tried],
         cases=cases,

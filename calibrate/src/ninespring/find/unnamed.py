@@ -38,15 +38,7 @@ GIVES_ONLY = ("mixing", "crosstalk", "bridge", "plume", "delay")
 """Kinds whose size cannot be negative: they lead on what is there, and a part of it at most."""
 NAMED = "named"
 """Kind of what is in the library: looked at beside the others, never found here."""
-UNITS = {
-    "pickup": "K",
-    "bridge": "W/K",
-    "plume": "W/K",
-    "heat": "W",
-    "sensor": "K",
-    "reading": "K",
-    "surroundings": "K",
-}
+UNIT = {"pickup": "K", "bridge": "W/K", "plume": "W/K", "heat": "W", "sensor": "K", "reading": "K", "surroundings": "K"}
 """Of a cause's size; the others are parts of what they take from."""
 ROOM_K = 10.0
 """What a room can change by while somebody measures."""
@@ -92,11 +84,11 @@ class Hidden:
         missing, and a room is where somebody works."""
         if self.cause.kind == "surroundings":
             return abs(self.size) <= ROOM_K
-        return self.cause.kind in UNITS or -1.0 <= self.size <= (1.0 if self.cause.kind in GIVES_ONLY else math.inf)
+        return self.cause.kind in UNIT or -1.0 <= self.size <= (1.0 if self.cause.kind in GIVES_ONLY else math.inf)
 
     def told(self) -> results.Unnamed:
         """Return what diagnosis.json says of it."""
-        unit = UNITS.get(self.cause.kind, "1")
+        unit = UNIT.get(self.cause.kind, "1")
         text, size = self.text, self.size
         for more, less in LESS if size < 0.0 else ():
             if more in text:

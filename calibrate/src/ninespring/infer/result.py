@@ -80,12 +80,8 @@ def model_of(
         model.effects.remove("ambient_drift")
         for name in ("ambient_amplitude_k", "ambient_ramp_k_per_h"):
             model.parameters.pop(name, None)
-    on = set(model.effects)
-    model.parameters = {
-        k: v
-        for k, v in model.parameters.items()
-        if table[k.partition("[")[0]].effect is None or table[k.partition("[")[0]].effect in on
-    }
+    on = {None, *model.effects}
+    model.parameters = {k: v for k, v in model.parameters.items() if table[k.partition("[")[0]].effect in on}
     model.stderr = {k: v for k, v in model.stderr.items() if k in model.parameters}
     for name, (value, error) in (absent or {}).items():
         model.parameters[name], model.stderr[name] = value, error

@@ -111,16 +111,11 @@ def pseudo_terminal(name: str) -> tuple[int, ...] | None:
     if Path(os.path.realpath(name)).parent != Path("/dev/pts"):
         return None
     try:
-        link, device = os.lstat(name), os.stat(name)
+        link, tty = os.lstat(name), os.stat(name)
     except OSError:
         return None
-    return (
-        device.st_dev,
-        device.st_ino,
-        device.st_ctime_ns,
-        link.st_ino,
-        link.st_mtime_ns if Path(name).is_symlink() else 0,
-    )
+    made_ns = link.st_mtime_ns if Path(name).is_symlink() else 0
+    return tty.st_dev, tty.st_ino, tty.st_ctime_ns, link.st_ino, made_ns
 
 
 def _who_has(name: str) -> str:

@@ -50,11 +50,7 @@ def page(progress: Progress, array: Array) -> str:
         faults=[fault for one in drives for fault in one["faults"]],
         diagnosis=DIAGNOSIS,
         verified=error_rows(*errors) if errors else None,
-        sent=[
-            (f"${name}", had.get(name, "–"), found[name])
-            for name in found
-            if float(had.get(name, "nan")) != float(found[name])
-        ],
+        sent=[(f"${k}", had.get(k, "–"), new) for k, new in found.items() if float(had.get(k, "nan")) != float(new)],
         new=SETTINGS,
         old=OLD_SETTINGS,
         folder=progress.folder,

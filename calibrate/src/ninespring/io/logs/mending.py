@@ -169,15 +169,10 @@ def mask_bad_sensors(run: Run) -> None:
             at = int(np.argmax(np.where(measured[begins] == extreme, lengths, 0)))
             begin, longest, inner = int(begins[at]), int(lengths[at]), measured[measured != extreme]
             switched = _switches(run, k, seen[begin : begin + longest]).size > 0
-            elsewhere = _stands(inner)[1].max(initial=0)
+            others = _stands(inner)[1].max(initial=0)
             # Ordinary quantisation also repeats values; a clipped sensor stays at ITS extreme far longer
             # than it ever stays at any other value.
-            if (
-                inner.size >= 10
-                and longest >= 15
-                and longest > 4 * elsewhere
-                and _is_stopped(measured, begin, switched)
-            ):
+            if inner.size >= 10 and longest >= 15 and longest > 4 * others and _is_stopped(measured, begin, switched):
                 # near the limit only what the noise carried down is seen: those rows would pull the fit
                 run.temperature_c[seen[np.abs(measured - extreme) <= 4.0 * noise[k]], k] = np.nan
                 run.notes.append(
