@@ -139,12 +139,12 @@ def plan_experiment(
     at = np.searchsorted([one.at_s for one in steps], time_s, "right") - 1
     fan = np.array([one.fan for one in steps])[at] / 100.0
     full_a = min(full_a, supply_a / max(percent.sum(axis=1).max() / 100.0, 1e-9))
-    temperature = _temperatures(array, percent[at] / 100.0 * full_a, fan)
+    temperature = _temperatures(_declared(array), percent[at] / 100.0 * full_a, fan)
     while temperature.max() > hottest_c:
         if full_a < LEAST_A:
             raise InputError(f"this experiment gets hotter than {hottest_c:g} degC with any current")
         full_a *= BACK_OFF
-        temperature = _temperatures(array, percent[at] / 100.0 * full_a, fan)
+        temperature = _temperatures(_declared(array), percent[at] / 100.0 * full_a, fan)
     lines = [*whole_springs(array), "policy open", f"$open_current_a={full_a:.3f}", "off all", "fan 0"]
     before, blows = np.zeros(array.springs), 0
     for one in steps:
@@ -176,12 +176,12 @@ def plan_through(model: Model, spring: int, supply_a: float, hottest_c: float) -
     for current_a in np.arange(0.6, min(ranges.PLAN_CURRENT_A.high, supply_a) + 1e-9, 0.1):
         drive = np.zeros((len(time_s), model.array.springs))
         drive[: int(THROUGH_S), spring - 1] = current_a
-        beyond = np.flatnonzero(_temperatures_of(plant, drive)[: int(THROUGH_S), spring - 1] >= end_c)
+        beyond = np.flatnonzero(_temperatures(plant, drive)[: int(THROUGH_S), spring - 1] >= end_c)
         if not beyond.size:
             continue
         off_s = int(beyond[0]) + 1
         drive[off_s:] = 0.0
-        hottest = float(_temperatures_of(plant, drive).max())
+        hottest = float(_temperatures(plant, drive).max())
         if hottest > hottest_c:
             break
         lines = ["policy open", f"$open_current_a={current_a:.3f}", "off all", "fan 0"]
@@ -225,13 +225,12 @@ def _stretches(
     return out
 
 
+Blows = tuple[tuple[float, float, int], ...]
+"""When the fan blows, parts of a plan, and how, percent."""
+
+
 def _simulated(
-    array: Array,
-    stretches: list[Stretch],
-    duration_s: float,
-    current_a: float,
-    resting: int,
-    blows: tuple[tuple[float, float, int], ...],
+    array: Array, stretches: list[Stretch], duration_s: float, current_a: float, resting: int, blows: Blows
 ) -> tuple[np.ndarray, np.ndarray]:
     time_s = np.arange(0.0, duration_s)
     drive = np.full((len(time_s), array.springs), resting / 100.0 * current_a)
@@ -240,12 +239,7 @@ def _simulated(
     fan = np.zeros(len(time_s))
     for begin, end, percent in blows:
         fan[(time_s >= begin * duration_s) & (time_s < end * duration_s)] = percent / 100.0
-    return drive, _temperatures(array, drive, fan)
-
-
-def _temperatures(array: Array, drive: np.ndarray, fan: np.ndarray) -> np.ndarray:
-    """Return (s, springs) degC of an array as declared, given currents (s, springs) and fan (s,) each second."""
-    return _temperatures_of(_declared(array), drive, fan)
+    return drive, _temperatures(_declared(array), drive, fan)
 
 
 def _declared(array: Array) -> native.Plant:
@@ -265,7 +259,7 @@ def whole_springs(array: Array) -> list[str]:
     return [f"${name}={value:.3f}" for name, value in limits.items()]
 
 
-def _temperatures_of(plant: native.Plant, drive: np.ndarray, fan: np.ndarray | None = None) -> np.ndarray:
+def _temperatures(plant: native.Plant, drive: np.ndarray, fan: np.ndarray | None = None) -> np.ndarray:
     """Return (s, springs) degC of a plant from rest, given currents (s, springs) and fan (s,; None: off) each second."""
     plant.reset()
     around = np.full(len(drive), plant.get("ambient_c"))
@@ -273,12 +267,7 @@ def _temperatures_of(plant: native.Plant, drive: np.ndarray, fan: np.ndarray | N
 
 
 def _lines(
-    springs: int,
-    stretches: list[Stretch],
-    duration_s: float,
-    current_a: float,
-    resting: int,
-    blows: tuple[tuple[float, float, int], ...],
+    springs: int, stretches: list[Stretch], duration_s: float, current_a: float, resting: int, blows: Blows
 ) -> list[str]:
     events: list[tuple[float, int, str]] = []
     for begin, end, percent in blows:
