@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -18,10 +17,10 @@ BELIEVED = math.log(3.0)
 combination stays near what was declared."""
 
 
-def base_spec(problem: Problem, frozen: bool = False, extra: Mapping[str, float] | None = None) -> Spec:
+def base_spec(problem: Problem, frozen: bool = False) -> Spec:
     """Return the declared model of these runs: what is always fitted (nothing where frozen)."""
     runs = problem.runs
-    fixed = dict(problem.declared) | dict(extra or {})
+    fixed = dict(problem.declared)
     free: list[Free] = []
     get = problem.base_value
     modes = {run.mode for run in runs}
