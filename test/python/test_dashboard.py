@@ -241,13 +241,8 @@ def test_a_refusal_says_what_would_be_right_and_to_which_wish(tmp_path: Path) ->
         for number, (wish, why) in enumerate(refused):
             got = answer_to(socket, wish | {"id": number})
             assert got["kind"] == "refused" and why in got["why"], got
-        for line, said in (
-            ("on 1.0 50", ""),
-            ("on 1 30%", ""),
-            ("off 1.", ""),
-            ("on one 50", "defect"),
-            ("?", "<off|t:12.340|"),
-        ):
+        typed = {"on 1.0 50": "", "on 1 30%": "", "off 1.": "", "on one 50": "defect", "?": "<off|t:12.340|"}
+        for line, said in typed.items():
             got = answer_to(socket, {"do": "say", "line": line, "id": 99})
             assert (got["kind"] == "refused") == (said == "defect") and said in got.get("said", got.get("why")), got
         assert answer_to(socket, {"do": "level", "spring": 1, "level": 5, "id": 100})["kind"] == "done"
@@ -457,17 +452,13 @@ def test_an_array_of_another_size_is_shown_and_driven_as_that(tmp_path: Path) ->
 
 
 def test_springs_are_shown_as_off_by_their_faults_and_the_boards_not_by_a_remark(tmp_path: Path) -> None:
-    remarks = [
+    told = [
         "thermistor: no room is as it says, 21.00 degC holds",
         "found: supply 4.93 V, diodes 0.38 V +-0.03; declared: 5.00 V, 0.00 V",
     ]
     board = FakeBoard()
     with page_of(board, tmp_path) as socket:
-        for faults, level in (
-            (remarks, 30),
-            (["spring 1: fault 15 sensor_mismatch", remarks[1]], 0),
-            (["supply: off"], 0),
-        ):
+        for faults, level in ((told, 30), (["spring 1: fault 15 sensor_mismatch", told[1]], 0), (["supply: off"], 0)):
             board.answers["faults"] = ["ok"]
             awaited(socket, lambda state: state.get("faults") == [])
             assert answer_to(socket, {"do": "level", "spring": 1, "level": 30, "id": 1})["kind"] == "done"

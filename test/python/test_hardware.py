@@ -72,12 +72,8 @@ def test_pins_and_addresses_are_the_firmwares() -> None:
         assert f"{w.output} {w.pin}" in port, w
         assert f"DDR{w.port[1]} |= PWM_PINS" in source, w
     assert [w.port[2] for w in circuit.WIRING] == ["3", "4", "5"] * 3
-    first = int(
-        re.search(r"CURRENT_SENSOR_FIRST_ADDRESS (0x[0-9A-F]+)u", (ROOT / "firmware" / "current_sensor.h").read_text())[
-            1
-        ],
-        16,
-    )
+    sensors = (ROOT / "firmware" / "current_sensor.h").read_text()
+    first = int(re.search(r"CURRENT_SENSOR_FIRST_ADDRESS (0x[0-9A-F]+)u", sensors)[1], 16)
     for w in circuit.WIRING:
         assert w.address == first + w.spring - 1 == circuit.address_of(w.a1, w.a0)
 

@@ -207,13 +207,8 @@ def test_a_heater_boards_table_is_read_as_its_programs_write_it(tmp_path: Path, 
     (tmp_path / "logger.csv").write_text(form)
     *keys, header, row = importing.import_table(tmp_path / "logger.csv", "tclab").splitlines()
     assert keys[-1] == "# sensor: semiconductor"
-    assert dict(zip(header.split(","), map(float, row.split(",")), strict=True)) == {
-        "time_s": 0.0,
-        "u1": 0.5,
-        "u2": 0.0,
-        "t1_c": 20.5,
-        "t2_c": 21.0,
-    }
+    wanted = {"time_s": 0.0, "u1": 0.5, "u2": 0.0, "t1_c": 20.5, "t2_c": 21.0}
+    assert dict(zip(header.split(","), map(float, row.split(",")), strict=True)) == wanted
 
 
 @pytest.mark.parametrize(

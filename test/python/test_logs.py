@@ -395,31 +395,23 @@ def test_one_column_in_fahrenheit_is_refused_by_its_name_and_a_hot_start_is_not(
     assert read_log(make_log(change=hot)).springs == 9
 
 
+def in_fahrenheit(columns: dict[str, np.ndarray]) -> None:
+    columns.update({f"t{k}_c": columns[f"t{k}_c"] * 1.8 + 32 for k in range(1, 10)})
+    columns.update(i1_a=np.maximum(columns["i1_a"], 0.5), v1_v=np.maximum(columns["v1_v"], 0.1))
+
+
 @pytest.mark.parametrize(
     ("change", "word"),
     [
         (lambda c: c.update(time_s=np.arange(600.0) * 120), "milliseconds"),
         (lambda c: c.update(time_s=np.arange(600.0) / 60), "minutes"),
         (lambda c: c["ambient_c"].__setitem__(slice(300, None), 30.0), "jumps from 20 to 30"),
-        (
-            lambda c: c.update(
-                {f"t{k}_c": c[f"t{k}_c"] * 1.8 + 32 for k in range(1, 10)}
-                | {"i1_a": np.maximum(c["i1_a"], 0.5), "v1_v": np.maximum(c["v1_v"], 0.1)}
-                | {"ambient_c": np.full(600, np.nan)}
-            ),
-            "in Fahrenheit would be a room",
-        ),
+        (lambda c: in_fahrenheit(c) or c["ambient_c"].fill(np.nan), "in Fahrenheit would be a room"),
         (
             lambda c: c.update({f"{a}{k}_{b}": c[f"{x}{k}_{y}"].copy() for k in range(1, 10) for a, b, x, y in SWAP}),
             "currents and voltages are swapped",
         ),
-        (
-            lambda c: c.update(
-                {f"t{k}_c": c[f"t{k}_c"] * 1.8 + 32 for k in range(1, 10)}
-                | {"i1_a": np.maximum(c["i1_a"], 0.5), "v1_v": np.maximum(c["v1_v"], 0.1)}
-            ),
-            "Fahrenheit",
-        ),
+        (in_fahrenheit, "Fahrenheit"),
     ],
 )
 def test_what_is_possible_but_unlikely_is_said(make_log, change, word: str) -> None:

@@ -73,13 +73,9 @@ def test_without_a_thermometer_thin_wire_that_never_transforms_is_refused_and_pl
 
 def test_a_plan_tells_the_board_what_resistance_other_springs_have() -> None:
     thin = Array(1, 2, spring={"wire_diameter_mm": 0.4})
-    told = [step for step in plan.make_plan(thin, 900.0, 0.8, 14.0, 105.0).steps if step.startswith("$resistance_")]
-    assert [one[12:] for one in told] == [
-        "maximum_ohm=1.999",
-        "minimum_ohm=0.320",
-        "martensite_ohm=0.700",
-        "austenite_ohm=0.875",
-    ]
+    steps = plan.make_plan(thin, 900.0, 0.8, 14.0, 105.0).steps
+    told = [step.removeprefix("$resistance_") for step in steps if step.startswith("$resistance_")]
+    assert told == ["maximum_ohm=1.999", "minimum_ohm=0.320", "martensite_ohm=0.700", "austenite_ohm=0.875"]
     assert not any("resistance" in step for step in plan.make_plan(Array(1, 2), 900.0, 0.8, 14.0, 105.0).steps)
 
 

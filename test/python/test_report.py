@@ -151,21 +151,13 @@ def test_the_report_shows_rivals_what_is_unexplained_and_what_is_not_determined(
     changed.heat = dataclasses.replace(found.heat, watts=watts)
     text = report.html_report(changed)
     page = Page(text)
-    assert {
-        "Heat of unknown origin",
-        "Unexplained",
-        "What these data cannot tell apart",
-        "Not determined by these data",
-    } <= set(page.headings)
+    assert {"Heat of unknown origin", "Unexplained"} <= set(page.headings)
+    assert {"What these data cannot tell apart", "Not determined by these data"} <= set(page.headings)
     wanted = ["latent_heat", "shared_air", "0.400", "3.0", "all springs on for 60 min; watch spring 1"]
     assert wanted in page.rows
-    for words in (
-        "depends on the moon",
-        "latent_heat_j: the data cannot",
-        "sensor_lag_s: at its",
-        "determined in combination only: loss_w_per_k, sensor_lag_s",
-    ):
+    for words in ("depends on the moon", "latent_heat_j: the data cannot", "sensor_lag_s: at its"):
         assert words in text
+    assert "determined in combination only: loss_w_per_k, sensor_lag_s" in text
 
 
 def told(**more: object) -> results.Diagnosis:
@@ -207,13 +199,8 @@ def test_the_verdict_says_the_outcome() -> None:
 
 
 def test_the_terminal_tells_what_acts_without_a_name(capsys: pytest.CaptureFixture[str]) -> None:
-    cause = results.Unnamed(
-        kind="heat",
-        size=0.1003,
-        stderr=0.0002,
-        unit="W",
-        text="spring 8 is given heat, 300 to 600 s of run 1: 0.1003 W (+-0.0002)",
-    )
+    said = "spring 8 is given heat, 300 to 600 s of run 1: 0.1003 W (+-0.0002)"
+    cause = results.Unnamed(kind="heat", size=0.1003, stderr=0.0002, unit="W", text=said)
     command._print_diagnosis(told(unnamed=[cause]), "Missing: nothing.")
     assert "a cause without a name: Spring 8 is given heat" in capsys.readouterr().out
 

@@ -582,15 +582,9 @@ def test_a_run_that_begins_warm_needs_no_effect(tmp_path: Path) -> None:
 
 def test_a_model_with_effects_needs_no_other_on_the_log_it_came_from(make_log, tmp_path: Path) -> None:
     """Also where an effect has variants: the one that the model's parameters speak of is taken, and from there."""
+    sag = {"supply_sag": {"supply_resistance_ohm": 8.0, "supply_chopped": 1.0}}
     for name, array, declared, run in (
-        (
-            "chopped loads",
-            Array(1, 2),
-            heaters(),
-            read_log(
-                commanded(tmp_path / "u.csv", {"supply_sag": {"supply_resistance_ohm": 8.0, "supply_chopped": 1.0}}), 2
-            ),
-        ),
+        ("chopped loads", Array(1, 2), heaters(), read_log(commanded(tmp_path / "u.csv", sag), 2)),
         ("spring 4", Array(), None, read_log(make_log(effects={"spring_mismatch": {"loss_scale[4]": 1.4}}, seed=3))),
     ):
         first = diagnosis.diagnose(array, [run], model=declared)
