@@ -143,12 +143,8 @@ def fit(array: Array, runs: Sequence[Run]) -> tuple[Resistances, Fit, Fit]:
         unit = native.parameter_table()[name.partition("[")[0]].unit
         return Free(name, start, 0.2 * start, 5.0 * start, unit, (name,), True, prior=spread)
 
-    spec = base_spec(problem).with_effect(
-        "latent_heat",
-        [replace(number("latent_heat_j", get("latent_heat_j"), LIKE_DECLARED), effect="latent_heat")],
-        (),
-        "",
-    )
+    latent = replace(number("latent_heat_j", get("latent_heat_j"), LIKE_DECLARED), effect="latent_heat")
+    spec = base_spec(problem).with_effect("latent_heat", [latent], (), "")
     wires = [number("resistance_martensite_ohm", mean, LIKE_DECLARED)]
     wires.append(number("resistance_austenite_ohm", mean * ratio, LIKE_DECLARED))
     wires += [number(f"resistance_scale[{k + 1}]", float(cold[k]) / mean, ALIKE) for k in np.flatnonzero(known)]

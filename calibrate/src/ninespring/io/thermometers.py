@@ -61,12 +61,8 @@ class Lines:
         if self.clock is not None and stamp is None:
             return None
         low, high = LIMITS["t"][:2]
-        values = {
-            spring: value
-            for spring, value in zip(self.springs, numbers, strict=True)
-            if spring is not None and value is not None and low <= value <= high
-        }
-        return stamp, values
+        each = zip(self.springs, numbers, strict=True)
+        return stamp, {k: c for k, c in each if k is not None and c is not None and low <= c <= high}
 
     def _guess(self, numbers: list[float | None]) -> None:
         if self._first and len(numbers) != len(self._first[0]):

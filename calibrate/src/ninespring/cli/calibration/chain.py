@@ -326,11 +326,8 @@ class Calibration:
                 made, worse, _ = checked_settings(self.model(), as_lines(self.had), True, say)
             head = ["# from model.toml, by `ninespring calibrate`"]
             write_atomically({self.folder / SETTINGS: "\n".join([*head, made.lines])})
-            self.progress.keep(
-                "export",
-                {"settings": made.written, "kept": together(made.kept, made.written), "worse": worse},
-                SETTINGS,
-            )
+            kept = together(made.kept, made.written)
+            self.progress.keep("export", {"settings": made.written, "kept": kept, "worse": worse}, SETTINGS)
             self._tell(
                 "export",
                 f"{len(made.written)} settings were determined, {len(settings_that_differ(self._found(), self.had))} of "
