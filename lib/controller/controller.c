@@ -13,6 +13,7 @@
 #define SILENT_MOST          (3600ul * TICKS_PER_S) /* host_timeout_s at its most */
 #define SUPPLY_TICKS         3u /* the relay closes 10 ms after the second pulse */
 #define FLOOR_TURNS          (CIRCUIT_CHECK_TICKS - CIRCUIT_CHECK_TICKS / TICKS_PER_STEP)
+#define RESISTANCES_A_TURN   2u /* of nine springs six turns are left: each is told in 0.5 s */
 #define TIME_CONSTANT_MOST_S 3600ul
 
 void controller_settings_default(controller_settings_t *settings)
@@ -459,13 +460,13 @@ static void raise_ceiling(controller_t *controller, uint8_t k)
 /* The current loop of one spring after the other learns of its phase, which moves slowly. */
 static void take_resistance_turn(controller_t *controller)
 {
-    tell_resistance(controller, controller->resistance_turn);
-    controller->resistance_turn =
-        (uint8_t)((controller->resistance_turn + 1u) % controller->springs);
+    const uint8_t k = controller->resistance_turn;
+    tell_resistance(controller, k);
+    controller->resistance_turn = (uint8_t)(k + 1u < controller->springs ? k + 1u : 0u);
 }
 
-/* In the ticks between two steps of the model, half a round apart for each spring: a ceiling, or
- * what takes less. */
+/* In the ticks between two steps of the model, half a round apart for each spring: its circuit, its
+ * ceiling; what may wait is done in the others. */
 static void take_floor_turn(controller_t *controller)
 {
     const uint8_t turn = controller->floor_turn;
@@ -478,8 +479,13 @@ static void take_floor_turn(controller_t *controller)
     for (uint16_t k = raised; k < controller->springs; k += FLOOR_TURNS) {
         raise_ceiling(controller, (uint8_t)k);
     }
+    if (turn < controller->springs && controller->springs < FLOOR_TURNS) {
+        return;
+    }
     if (raised >= controller->springs) {
-        take_resistance_turn(controller);
+        for (uint8_t n = 0; n < RESISTANCES_A_TURN; n++) {
+            take_resistance_turn(controller);
+        }
     }
     if (scrub_step(&controller->scrub, controller_fixed, controller, CONTROLLER_SCRUB_BYTES)) {
         thermal_model_refresh(&controller->model);
@@ -519,7 +525,6 @@ static void step_model(controller_t *controller, const controller_inputs_t *inpu
 static void watch_supply(controller_t *controller)
 {
     if (!controller_supply_is_fitted(controller)) {
-        controller->supply_off = false;
         controller->supply_ticks = SUPPLY_TICKS;
         return;
     }
@@ -712,7 +717,7 @@ bool controller_supply_is_held(const controller_t *controller)
 
 bool controller_supply_is_off(const controller_t *controller)
 {
-    return controller->supply_off;
+    return controller_supply_is_fitted(controller) && controller->supply_off;
 }
 
 void controller_host_heard(controller_t *controller)

@@ -144,7 +144,7 @@ void controller_tick(controller_t *controller, const controller_inputs_t *inputs
  * CONTROLLER_SCRUB_MS, and before each change of a part of it. From then on nothing is driven and
  * the supply is not held; there is no way back but controller_init, as nothing here can be trusted.
  */
-#define CONTROLLER_SCRUB_BYTES 16u /* a tick between two steps of the model */
+#define CONTROLLER_SCRUB_BYTES 26u /* a tick in which no circuit is judged, 25 a second of nine */
 #define CONTROLLER_SCRUB_MS    1000u
 bool controller_is_sound(const controller_t *controller);
 

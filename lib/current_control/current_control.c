@@ -21,6 +21,16 @@ static int32_t offset_q16(const current_control_parameters_t *p, uint16_t drop_m
     return (int32_t)(drop_mv * 51200ul / swing_mv * 1024ul); /* 800 steps */
 }
 
+static int16_t estimate_q16(const current_control_t *control, uint16_t resistance_mohm)
+{
+    uint16_t sum_mohm = (uint16_t)(resistance_mohm + control->fixed_mohm);
+    if (sum_mohm < resistance_mohm) {
+        sum_mohm = UINT16_MAX;
+    }
+    uint32_t gain_q16 = ((uint32_t)sum_mohm * control->gain_q24_per_mohm) >> 8;
+    return gain_q16 > ESTIMATE_LIMIT ? ESTIMATE_LIMIT : (int16_t)gain_q16;
+}
+
 static int32_t limited(int32_t value, int32_t most)
 {
     return value > most ? most : value < -most ? -most : value;
@@ -41,31 +51,61 @@ void current_control_set_drop(current_control_t *control, uint16_t drop_mv)
     }
 }
 
-bool current_control_apply(current_control_t *control, const current_control_parameters_t *p,
-                           uint16_t *bad)
+static void take(current_control_t *control, const current_control_parameters_t *p)
 {
-    if (!current_control_check(p, bad)) {
-        return false;
-    }
     control->parameters = *p;
     /* mean voltage behind the switch: duty x supply - (1 - duty) x drop */
     uint16_t swing_mv = (uint16_t)(p->supply_mv + p->freewheel_mv);
     /* 800 steps / (1000 x swing) per mA mohm, in Q24 */
     control->gain_q24_per_mohm = (uint16_t)(13421773ul / swing_mv);
     control->fixed_mohm = (uint16_t)(p->shunt_mohm + p->wiring_mohm);
-    control->offset_q16 = offset_q16(p, p->freewheel_mv);
     uint32_t trim_q16 = ((uint32_t)p->trim_limit_mohm * control->gain_q24_per_mohm) >> 8;
     control->trim_limit_q24 = (int32_t)(trim_q16 > TRIM_LIMIT ? TRIM_LIMIT : trim_q16) * 256;
     control->integral_q16 = (uint16_t)(p->integral_permille * 65535ul / 1000u);
+}
+
+/* Estimated of a loop as it is declared now; what a driven one's gain was stands. */
+static void estimate_anew(const current_control_t *control, current_control_channel_t *c,
+                          uint16_t resistance_mohm)
+{
+    const int16_t before_q16 = c->estimate_q16;
+    c->estimate_q16 = estimate_q16(control, resistance_mohm);
+    if (c->reference_ma != 0) {
+        c->trim_q24 = limited(c->trim_q24 - 256 * ((int32_t)c->estimate_q16 - before_q16),
+                              control->trim_limit_q24);
+    }
+}
+
+bool current_control_apply(current_control_t *control, const current_control_parameters_t *p,
+                           uint16_t *bad)
+{
+    if (!current_control_check(p, bad)) {
+        return false;
+    }
+    const uint16_t gain_q24_per_mohm = control->gain_q24_per_mohm;
+    const uint16_t fixed_mohm = control->fixed_mohm;
+    take(control, p);
+    for (uint8_t k = 0; k < CURRENT_CONTROL_MAX_CHANNELS; k++) {
+        current_control_channel_t *c = &control->channel[k];
+        const uint32_t sum_mohm = ((uint32_t)c->estimate_q16 << 8) / gain_q24_per_mohm;
+        const uint32_t most_mohm = fixed_mohm + (uint32_t)UINT16_MAX;
+        estimate_anew(control, c,
+                      sum_mohm <= fixed_mohm
+                          ? 0
+                          : (uint16_t)((sum_mohm < most_mohm ? sum_mohm : most_mohm) - fixed_mohm));
+    }
+    current_control_set_drop(control, p->freewheel_mv);
     return true;
 }
 
 bool current_control_init(current_control_t *control,
                           const current_control_parameters_t *parameters, uint16_t *bad)
 {
-    if (!current_control_apply(control, parameters, bad)) {
+    if (!current_control_check(parameters, bad)) {
         return false;
     }
+    take(control, parameters);
+    control->offset_q16 = offset_q16(parameters, parameters->freewheel_mv);
     control->even_turn = false;
     for (uint8_t k = 0; k < CURRENT_CONTROL_MAX_CHANNELS; k++) {
         control->channel[k] = (current_control_channel_t){0};
@@ -83,13 +123,7 @@ void current_control_reset(current_control_t *control, uint8_t channel)
 void current_control_set_resistance(current_control_t *control, uint8_t channel,
                                     uint16_t resistance_mohm)
 {
-    uint16_t sum_mohm = (uint16_t)(resistance_mohm + control->fixed_mohm);
-    if (sum_mohm < resistance_mohm) {
-        sum_mohm = UINT16_MAX;
-    }
-    uint32_t gain_q16 = ((uint32_t)sum_mohm * control->gain_q24_per_mohm) >> 8;
-    control->channel[channel].estimate_q16 =
-        gain_q16 > ESTIMATE_LIMIT ? ESTIMATE_LIMIT : (int16_t)gain_q16;
+    control->channel[channel].estimate_q16 = estimate_q16(control, resistance_mohm);
 }
 
 /* Duty steps per mA in Q16: the estimated loop and what was learnt beyond it. */

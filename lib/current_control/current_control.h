@@ -53,7 +53,8 @@ bool current_control_check(const current_control_parameters_t *parameters, uint1
 bool current_control_init(current_control_t *control,
                           const current_control_parameters_t *parameters, uint16_t *bad);
 
-/* Replaces the parameters, keeps references and what was learnt. Fails (false, nothing changed) as
+/* Replaces the parameters, keeps references and what was learnt: of a driven channel, what its loop
+ * takes, whatever is declared of it now, as far as the trim goes. Fails (false, nothing changed) as
  * current_control_check does. */
 bool current_control_apply(current_control_t *control,
                            const current_control_parameters_t *parameters, uint16_t *bad);
@@ -70,7 +71,7 @@ static inline uint8_t current_control_dead_steps(const current_control_t *contro
 }
 
 /* Estimate of the spring's resistance, without shunt and wiring; 0 after init. Call it when it
- * changes, and after apply. */
+ * changes. */
 void current_control_set_resistance(current_control_t *control, uint8_t channel,
                                     uint16_t resistance_mohm);
 

@@ -56,6 +56,9 @@ typedef struct {
     float found_mv;    /* behind the switch */
     float expected_mv; /* by duty, supply and drop */
     float share;       /* circuit_window_share of them */
+    float beside;      /* its share of what another one showed; 0: none tells */
+    bool outvoted;     /* by that and others, and all at about the same volts */
+    bool acquitted;    /* it shows beside them what it always did, at whatever volts */
     float current_ma;
     bool tells;    /* there were readings enough */
     bool steady;   /* all at about the same duty */

@@ -5,7 +5,8 @@
 #define DUTY_STEPS 800.0f
 /* A window's variance, mV^2: not of noise, but of what wiring and gains make of it. */
 #define WINDOW_MV2  3000.0f
-#define MOST_BEFORE 30.0f     /* windows: four rounds of nine springs */
+#define MOVES_PART  0.02f /* of the supply, from round to round: within one it is what all share */
+#define MOST_BEFORE 30.0f /* windows: four rounds of nine springs */
 #define MOST_SQUARE 200000.0f /* steps^2: some heatings */
 /* Deviations of what is declared. */
 #define SUPPLY_PART   0.08f
@@ -106,6 +107,8 @@ void circuit_source_begin(circuit_source_t *source, const current_control_parame
 
 void circuit_source_take(circuit_source_t *source, float duty, float voltage_mv)
 {
+    source->duty_square += duty * duty; /* fit takes the means off */
+    source->duty_mv += duty * voltage_mv;
     source->windows++;
     source->duty += duty;
     source->voltage_mv += voltage_mv;
@@ -129,6 +132,8 @@ bool circuit_source_fit(circuit_source_t *s, const current_control_parameters_t 
     const float windows = (float)s->windows, share = 1.0f / windows;
     const float now_duty = up_to(DUTY_STEPS, share * s->duty);
     const float now_mv = up_to(MOST_MV, share * s->voltage_mv);
+    s->duty_square -= share * s->duty * s->duty;
+    s->duty_mv -= share * s->duty * s->voltage_mv;
     if (has_stepped(s, now_duty, now_mv)) {
         s->before = s->duty_square = s->duty_mv = 0.0f;
     }
@@ -138,7 +143,8 @@ bool circuit_source_fit(circuit_source_t *s, const current_control_parameters_t 
     s->mean_duty = up_to(DUTY_STEPS, s->mean_duty + part * duty);
     s->mean_mv = up_to(MOST_MV, s->mean_mv + part * mv);
     s->before = within(before + windows, before, MOST_BEFORE);
-    const float weight = part * before;
+    const float moves_mv = MOVES_PART * s->mean_mv;
+    const float weight = part * before / (1.0f + part * before * moves_mv * moves_mv / WINDOW_MV2);
     const float square = up_to(2.0f * MOST_SQUARE, s->duty_square + weight * duty * duty);
     const float kept = square > MOST_SQUARE ? MOST_SQUARE / square : 1.0f;
     s->duty_square = kept * square;

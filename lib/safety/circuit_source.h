@@ -40,7 +40,9 @@ typedef struct {
     float before; /* windows of the rounds before, up to a limit: so it forgets */
     float mean_duty;
     float mean_mv;
-    float duty_square; /* sums, of how duty and voltage moved from round to round */
+    /* sums, of how duty and voltage moved within rounds and between them; of the running round
+     * squares and products, of which fit takes the means off */
+    float duty_square;
     float duty_mv;
 } circuit_source_t;
 
@@ -57,7 +59,10 @@ void circuit_source_take(circuit_source_t *source, float duty, float voltage_mv)
 
 /* Ends the round: what is believed is what fits best to mean duties and voltages of this round and
  * of those before, supply and drop as they are declared, each by its tolerance. A voltage that
- * moves with the duty tells both; one at about the same duty only what they make together. True if
+ * moves with the duty tells both; one at about the same duty only what they make together. Duties
+ * that differ within a round tell most, as it has one supply; from round to round that may move by
+ * 2
+ * %, as others load and leave it. True if
  * and only if another belief is taken: small changes are not worth it. */
 bool circuit_source_fit(circuit_source_t *source, const current_control_parameters_t *circuit);
 

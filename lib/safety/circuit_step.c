@@ -36,11 +36,13 @@ static uint16_t apart(uint16_t a, uint16_t b)
     return a > b ? (uint16_t)(a - b) : (uint16_t)(b - a);
 }
 
-static bool is_off(uint16_t now, uint16_t was, float most_part, float most)
+/* By more than so much of it and more_mv, of those mV that it was told by. */
+static bool is_off(uint16_t now, uint16_t was, float most_part, float told_mv, float more_mv)
 {
     const uint16_t by = apart(now, was);
     /* as a rule: no floating point; either share is above a thirty-second */
-    return by > was >> MOVED_SHARE_SHIFT && (float)by > most_part * (float)was + most;
+    return by > was >> MOVED_SHARE_SHIFT &&
+           (float)by * told_mv > (most_part * told_mv + more_mv) * (float)was;
 }
 
 /* Of a lie that lets its spring get hotter both move: of the current, the share falls by so much of
@@ -71,17 +73,16 @@ static bool has_moved(const circuit_shown_t *now, const circuit_shown_t *was)
 static bool shares_differ(const circuit_shown_t *now, const circuit_shown_t *was, float part,
                           float expected_mv, float fixed_ohm, const circuit_source_t *source)
 {
-    const float noise_part = part + NOISE_MV / expected_mv;
-    if (!is_off(now->share_q12, was->share_q12, noise_part, 0.0f)) {
+    if (!is_off(now->share_q12, was->share_q12, part, expected_mv, NOISE_MV)) {
         return false;
     }
     const float was_mv =
         CURRENT_MA * (float)was->current_16ma * ((float)was->ohm_q12 + Q12 * fixed_ohm);
-    const float change = expected_mv * (float)was->share_q12 / was_mv - 1.0f;
-    const bool is_more = (now->share_q12 > was->share_q12) == (change > 0.0f);
+    const float more_mv = expected_mv * (float)was->share_q12 - was_mv;
+    const bool is_more = (now->share_q12 > was->share_q12) == (more_mv > 0.0f);
     const float unsure_mv = is_more ? source->more_mv : source->less_mv;
-    return is_off(now->share_q12, was->share_q12, noise_part,
-                  Q12 * unsure_mv * fabsf(change) / expected_mv);
+    const float moved_mv = unsure_mv * fabsf(more_mv) / was_mv * (Q12 / (float)was->share_q12);
+    return is_off(now->share_q12, was->share_q12, part, expected_mv, NOISE_MV + moved_mv);
 }
 
 /* What it shows no more at this current is kept, if it did for some windows. */
@@ -112,6 +113,10 @@ static void look_back(circuit_step_t *step, const circuit_shown_t *now)
 bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
                         const circuit_source_t *source, const current_control_parameters_t *circuit)
 {
+    const bool beside = window->outvoted;
+    if (step->beside != beside) {
+        *step = (circuit_step_t){.beside = beside};
+    }
     const float fixed_ohm = 1e-3f * (float)((uint32_t)circuit->shunt_mohm + circuit->wiring_mohm);
     const float spring_mv = window->found_mv - fixed_ohm * window->current_ma;
     if (!circuit_window_compares(window) || spring_mv < NOISE_MV ||
@@ -119,7 +124,8 @@ bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
         leave(step);
         return false;
     }
-    const circuit_shown_t now = {to_q12(window->share), to_q12(spring_mv / window->current_ma),
+    const circuit_shown_t now = {to_q12(beside ? window->beside : window->share),
+                                 to_q12(spring_mv / window->current_ma),
                                  (uint8_t)fminf(window->current_ma / CURRENT_MA, 255.0f)};
     if (!window->steady) { /* of two currents: like one where their mean is */
         step->again = 1;
@@ -132,9 +138,9 @@ bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
     if (was->share_q12 == 0) {
         *was = now;
     }
-    const float change_part = CHANGE_PART + NOISE_MV / spring_mv;
     const float share_part = step->again ? AGAIN_PART : SHARE_PART;
-    if (is_off(now.ohm_q12, was->ohm_q12, change_part, 0.0f) &&
+    if ((beside || !window->acquitted) &&
+        is_off(now.ohm_q12, was->ohm_q12, CHANGE_PART, spring_mv, NOISE_MV) &&
         (!step->again || is_like_a_lie(&now, was)) &&
         shares_differ(&now, was, share_part, window->expected_mv, fixed_ohm, source)) {
         step->odd = step->odd < CIRCUIT_STEP_WINDOWS ? (step->odd + 1u) & 3u : step->odd;
@@ -159,7 +165,9 @@ void circuit_step_renew(circuit_step_t steps[], uint8_t springs, const circuit_s
     for (uint8_t k = 0; k < springs; k++) {
         for (uint8_t n = 0; n < 2; n++) {
             uint16_t *const share_q12 = &steps[k].was[n].share_q12;
-            *share_q12 = to_q12(part * (1.0f / Q12) * (float)*share_q12);
+            if (!steps[k].beside) {
+                *share_q12 = to_q12(part * (1.0f / Q12) * (float)*share_q12);
+            }
         }
     }
 }

@@ -2,8 +2,8 @@
  * at once or little by little, and no spring, contact or supply.
  * What it owns: what the last window of one spring showed, and one since which nothing else has
  * changed.
- * What it never does: look at another spring, latch a fault. It uses floating point, once in a
- * window. */
+ * What it never does: ask another spring but for what a window is told of them, latch a fault. It
+ * uses floating point, once in a window. */
 #ifndef CIRCUIT_STEP_H
 #define CIRCUIT_STEP_H
 
@@ -34,6 +34,7 @@ typedef struct {
     uint8_t windows : 2; /* at this current, saturating */
     uint8_t again : 1;   /* it has come back to this current */
     uint8_t moved : 1;   /* the last window was one that something else has changed */
+    uint8_t beside : 1;  /* shares are of what the others showed, not of the supply */
 } circuit_step_t;
 
 /* Takes a spring's window. True if and only if for CIRCUIT_STEP_WINDOWS on end, at a current within
@@ -47,6 +48,9 @@ typedef struct {
  * move as a lie moves them that lets its spring get hotter, the share down, by a fourth part to all
  * of the resistance: so such a lie is found, however slowly it grows. One that grows the other way
  * makes its spring colder, and is not told from a supply that rises as it transforms.
+ * A window that others outvote is judged by its share of theirs in place of that of the supply, so
+ * that a supply that all see move is nothing of its own; from the one kind to the other all begins
+ * anew. Of the others, one that is acquitted beside them is not odd.
  * At another current, or where a window tells nothing, is of less than 0.1 V or of less than 16 mA,
  * another window is kept, and this one beside it, if it was for 3 of them: a lie that has the
  * spring heated again is held against the hold before. There both must be off as such a lie moves

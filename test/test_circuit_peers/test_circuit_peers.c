@@ -22,13 +22,13 @@ void setUp(void)
 
 static bool takes(uint8_t spring, float expected_mv, float share)
 {
-    const circuit_window_t window = window_of(share * expected_mv, expected_mv, 0.0f);
+    circuit_window_t window = window_of(share * expected_mv, expected_mv, 0.0f);
     return circuit_peers_judge(&peers, SPRINGS, spring, &window, &source);
 }
 
 static void is_off(uint8_t spring)
 {
-    const circuit_window_t window = {.tells = false};
+    circuit_window_t window = {.tells = false};
     TEST_ASSERT_FALSE(circuit_peers_judge(&peers, SPRINGS, spring, &window, &source));
 }
 
@@ -74,7 +74,7 @@ TEST(who_is_off_is_no_peer)
 /* Found as it is off, and until it is cleared. */
 TEST(what_is_found_stays_found_until_cleared)
 {
-    const circuit_window_t nothing = {.tells = false};
+    circuit_window_t nothing = {.tells = false};
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 1.0f, 1.0f));
     TEST_ASSERT_EQUAL_HEX(1, rounds(3, SPRINGS, HEATS_MV, 0.7f, 1.0f));
     for (unsigned n = 0; n < 100; n++) {
@@ -155,7 +155,7 @@ TEST(of_too_few_volts_nothing_is_what_it_showed_before)
     TEST_ASSERT_EQUAL_HEX(1, rounds(3, 1, HEATS_MV, 1.0f, 0.0f));
 }
 
-/* However slow: what is soldered stays what it is; no share is learnt after 255 windows. */
+/* However slow: what is soldered stays what it is; no share is learnt after 127 windows. */
 TEST(a_drift_is_found_however_slow)
 {
     for (unsigned slow = 0; slow < 2; slow++) {
@@ -190,6 +190,7 @@ TEST(what_is_not_known_of_the_drop_is_let_pass_on_the_side_of_its_own_share)
         setUp();
         TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 1.1f, 1.0f));
         *(is_less != 0 ? &source.less_mv : &source.more_mv) = 200.0f;
+        source.unsure_mv = 200.0f;
         for (uint8_t k = 1; k < SPRINGS; k++) {
             (void)takes(k, HOLDS_MV, 1.0f);
         }
@@ -459,32 +460,38 @@ TEST(limits_are_where_they_are_stated)
         float drop_mv, more_mv, less_mv;
         float passes, found;
     } limits[] = {
-        /* 5 % and 25 mV; twice the others' is the most that is known */
-        {9, HEATS_MV, 1.0f, HEATS_MV, HEATS_MV, 1.0f, 0, 0, 0, 0.932f, 0.924f},
-        {9, HEATS_MV, 1.0f, HEATS_MV, HEATS_MV, 1.0f, 0, 0, 0, 1.068f, 1.076f},
-        {9, HOLDS_MV, 1.0f, HOLDS_MV, HOLDS_MV, 1.0f, 0, 0, 0, 0.890f, 0.885f},
-        {9, HEATS_MV, 0.75f, HEATS_MV, HEATS_MV, 0.75f, 0, 0, 0, 0.695f, 0.686f},
-        {9, HEATS_MV, 1.1f, HEATS_MV, HEATS_MV, 1.0f, 0, 0, 0, 1.03f, 1.02f},
-        {9, 144.0f, 0.4218f, 144.0f, 144.0f, 0.2109f, 0, 0, 0, 0.24f, 0.21f},
+        /* 5 % and 8 mV of what it showed beside them at the same volts; twice theirs is the most
+           that is known */
+        {9, HEATS_MV, 1.0f, HEATS_MV, HEATS_MV, 1.0f, 0, 0, 0, 0.946f, 0.940f},
+        {9, HEATS_MV, 1.0f, HEATS_MV, HEATS_MV, 1.0f, 0, 0, 0, 1.054f, 1.060f},
+        {9, HOLDS_MV, 1.0f, HOLDS_MV, HOLDS_MV, 1.0f, 0, 0, 0, 0.933f, 0.927f},
+        {9, HEATS_MV, 0.75f, HEATS_MV, HEATS_MV, 0.75f, 0, 0, 0, 0.709f, 0.703f},
+        {9, HEATS_MV, 1.1f, HEATS_MV, HEATS_MV, 1.0f, 0, 0, 0, 1.043f, 1.037f},
+        {9, 144.0f, 0.4218f, 144.0f, 144.0f, 0.2109f, 0, 0, 0, 0.35f, 0.33f},
+        /* at others, and the others at others than it was kept at */
+        {9, HEATS_MV, 1.0f, HOLDS_MV, HEATS_MV, 1.0f, 0, 0, 0, 0.893f, 0.887f},
+        {9, HEATS_MV, 1.0f, HEATS_MV, HOLDS_MV, 1.0f, 0, 0, 0, 0.906f, 0.899f},
+        {9, HEATS_MV, 1.0f, HEATS_MV, HOLDS_MV, 1.0f, 0, 200, 0, 0.892f, 0.884f},
+        /* 5 % and 25 mV of what was learnt */
         {9, 100.0f, 1.0f, 100.0f, 100.0f, 1.0f, 0, 0, 0, 0.60f, 0.54f}, /* of 0.1 V it tells */
         /* nothing is known: 18 % and 25 mV */
         {9, 0, 0, HEATS_MV, HEATS_MV, 1.0f, 0, 0, 0, 0.800f, 0.795f},
         {9, 0, 0, HEATS_MV, HEATS_MV, 0.75f, 0, 0, 0, 0.597f, 0.589f},
         {9, 0, 0, HEATS_MV, HEATS_MV, 1.5f, 0, 0, 0, 1.215f, 1.200f},
         /* beside one or two that show what they did: 5 % and what offsets make of other volts */
-        {3, HEATS_MV, 1.0f, HEATS_MV, HEATS_MV, 1.0f, 0, 0, 0, 0.932f, 0.924f},
+        {3, HEATS_MV, 1.0f, HEATS_MV, HEATS_MV, 1.0f, 0, 0, 0, 0.946f, 0.940f},
         {2, HEATS_MV, 1.0f, HEATS_MV, HEATS_MV, 1.0f, 0, 0, 0, 0.932f, 0.924f},
         {2, HEATS_MV, 0.75f, HEATS_MV, HEATS_MV, 0.75f, 0, 0, 0, 0.697f, 0.686f},
-        {4, HEATS_MV, 1.0f, HEATS_MV, HEATS_MV, 1.0f, 0, 0, 0, 0.932f, 0.924f},
+        {4, HEATS_MV, 1.0f, HEATS_MV, HEATS_MV, 1.0f, 0, 0, 0, 0.946f, 0.940f},
         /* a drop moves by a sixth: 60 mV of 400; at the same volts with those of the others, but
            for 20 mV */
         {9, 0, 0, HOLDS_MV, HOLDS_MV, 1.0f, 400, 0, 0, 0.72f, 0.69f},
         {9, 0, 0, HOLDS_MV, HEATS_MV, 1.0f, 400, 0, 0, 0.62f, 0.58f},
         {9, 0, 0, HEATS_MV, HEATS_MV, 1.0f, 400, 0, 0, 0.79f, 0.77f},
-        {9, HOLDS_MV, 1.0f, HOLDS_MV, HOLDS_MV, 1.0f, 400, 0, 0, 0.85f, 0.82f},
+        {9, HOLDS_MV, 1.0f, HOLDS_MV, HOLDS_MV, 1.0f, 400, 0, 0, 0.933f, 0.927f},
         {9, HEATS_MV, 1.0f, HOLDS_MV, HOLDS_MV, 1.0f, 400, 0, 0, 0.85f, 0.82f},
-        {9, HEATS_MV, 1.0f, HOLDS_MV, HEATS_MV, 1.0f, 400, 0, 0, 0.75f, 0.72f},
-        {9, HEATS_MV, 1.0f, HEATS_MV, HEATS_MV, 1.0f, 400, 0, 0, 0.92f, 0.90f},
+        {9, HEATS_MV, 1.0f, HOLDS_MV, HEATS_MV, 1.0f, 400, 0, 0, 0.796f, 0.789f},
+        {9, HEATS_MV, 1.0f, HEATS_MV, HEATS_MV, 1.0f, 400, 0, 0, 0.946f, 0.940f},
         /* what is not known of it is let pass on its own side, beside others driven otherwise */
         {9, 0, 0, HEATS_MV, HOLDS_MV, 1.0f, 0, 0, 200, 0.46f, 0.41f},
         {9, 0, 0, HEATS_MV, HOLDS_MV, 1.0f, 0, 200, 0, 1.54f, 1.59f},
@@ -541,7 +548,7 @@ TEST(the_middle_one_of_the_others_counts)
             }
         }
         (void)takes(4, HEATS_MV, 1.95f);
-        const circuit_window_t window = window_of((odd ? 0.79f : 0.80f) * HEATS_MV, HEATS_MV, 0.0f);
+        circuit_window_t window = window_of((odd ? 0.79f : 0.80f) * HEATS_MV, HEATS_MV, 0.0f);
         for (unsigned times = 0; times < 3; times++) {
             const bool found = circuit_peers_judge(&peers, 4, asked, &window, &source);
             TEST_ASSERT_EQUAL(odd && times == 2, found);
@@ -565,9 +572,9 @@ TEST(what_is_learnt_is_the_mean_of_its_windows)
     TEST_ASSERT_INT_WITHIN(26, 4096, peers.spring[0].own_q12);
     TEST_ASSERT_EQUAL_HEX(0, rounds(400, SPRINGS, HEATS_MV, 1.0f, 1.0f));
     TEST_ASSERT_INT_WITHIN(8, 4096, peers.spring[0].own_q12);
-    TEST_ASSERT_EQUAL_UINT(255, peers.spring[0].learnt);
-    TEST_ASSERT_EQUAL_HEX(0, rounds(1000, SPRINGS, HEATS_MV, 1.06f, 1.0f)); /* no more of it */
-    TEST_ASSERT_EQUAL_HEX(0, rounds(3, SPRINGS, HEATS_MV, 0.935f, 1.0f));
+    TEST_ASSERT_EQUAL_UINT(127, peers.spring[0].learnt);
+    TEST_ASSERT_EQUAL_HEX(0, rounds(1000, SPRINGS, HEATS_MV, 1.05f, 1.0f)); /* no more of it */
+    TEST_ASSERT_INT_WITHIN(8, 4096, peers.spring[0].own_q12);
 }
 
 /* What offsets may have made of a share is what they make of the mean voltage it was learnt at. */
@@ -761,6 +768,99 @@ TEST(another_one_at_few_volts_acquits_nobody)
         TEST_ASSERT_FALSE(takes(1, 110.0f, 1.0f));
         TEST_ASSERT_EQUAL(window == CIRCUIT_PEERS_WINDOWS - 1u, takes(0, HEATS_MV, 0.85f));
     }
+}
+
+/* A lie of a hold has its spring heated in the next window: the others' few volts, and all that
+ * their drop may be, are what they were when its share of theirs was kept. */
+TEST(who_lies_and_is_heated_for_it_is_found_beside_others_that_hold)
+{
+    for (unsigned is_less = 0; is_less < 2; is_less++) {
+        setUp();
+        source.drop_mv = 400.0f;
+        TEST_ASSERT_EQUAL_HEX(0, rounds(8, 4, HOLDS_MV, 1.02f, 1.05f));
+        for (unsigned window = 0; window < CIRCUIT_PEERS_WINDOWS; window++) {
+            for (uint8_t k = 1; k < 4; k++) {
+                TEST_ASSERT_FALSE(takes(k, HOLDS_MV, 1.05f));
+            }
+            TEST_ASSERT_EQUAL(window == CIRCUIT_PEERS_WINDOWS - 1u,
+                              takes(0, HEATS_MV, is_less != 0 ? 0.85f : 1.19f));
+        }
+    }
+}
+
+/* Where it began in the middle of a window, that one is kept by no more than a part. */
+TEST(the_window_in_which_it_begins_is_not_what_it_showed_before)
+{
+    TEST_ASSERT_EQUAL_HEX(0, rounds(8, 4, HEATS_MV, 1.0f, 1.0f));
+    TEST_ASSERT_EQUAL_HEX(0, rounds(1, 4, HEATS_MV, 0.96f, 1.0f));
+    TEST_ASSERT_EQUAL_HEX(0, rounds(2, 4, HEATS_MV, 0.92f, 1.0f));
+    TEST_ASSERT_EQUAL_HEX(1, rounds(1, 4, HEATS_MV, 0.92f, 1.0f));
+}
+
+/* One is as much of the others by whatever supply is believed. */
+TEST(another_belief_moves_nothing_beside_others)
+{
+    TEST_ASSERT_EQUAL_HEX(0, rounds(8, 4, HEATS_MV, 1.0f, 1.0f));
+    const circuit_source_t other = {.step_mv = 6.0f};
+    circuit_peers_renew(&peers, SPRINGS, &source, &other);
+    TEST_ASSERT_EQUAL_HEX(0,
+                          rounds(3, 4, HEATS_MV, 0.93f * 0.9f, 0.9f)); /* of one they come later */
+    TEST_ASSERT_EQUAL_HEX(1, rounds(1, 4, HEATS_MV, 0.93f * 0.9f, 0.9f));
+}
+
+/* It is cleared, and driven alone on the same supply: as little of it shows the same lie. */
+TEST(what_was_found_beside_others_is_known_where_it_is_alone)
+{
+    for (unsigned mended = 0; mended < 2; mended++) {
+        setUp();
+        TEST_ASSERT_EQUAL_HEX(0, rounds(8, 4, HEATS_MV, 0.9f, 0.9f));
+        TEST_ASSERT_EQUAL_HEX(1, rounds(3, 4, HEATS_MV, 0.9f * 0.91f, 0.9f));
+        for (uint8_t k = 1; k < 4; k++) {
+            is_off(k);
+        }
+        circuit_peers_clear(&peers, 0, true);
+        TEST_ASSERT_EQUAL(mended == 0, takes(0, HEATS_MV, mended != 0 ? 0.9f : 0.9f * 0.91f));
+    }
+}
+
+/* They stop: of the supply alone it has shown nothing yet. */
+TEST(what_it_showed_beside_others_is_no_share_of_the_supply)
+{
+    TEST_ASSERT_EQUAL_HEX(0, rounds(8, 4, HEATS_MV, 0.8f, 0.8f));
+    for (uint8_t k = 1; k < 4; k++) {
+        is_off(k);
+    }
+    TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, HEATS_MV, 0.8f, 0.0f));
+    TEST_ASSERT_EQUAL_HEX(1, rounds(3, 1, HEATS_MV, 0.7f, 0.0f));
+}
+
+/* For who judges a window after it: what it is of the others, and whether they tell the same. */
+TEST(a_window_is_told_what_it_is_beside_the_others)
+{
+    TEST_ASSERT_EQUAL_HEX(0, rounds(8, 4, HEATS_MV, 0.9f, 1.0f));
+    static const struct {
+        float own_mv, share;
+        bool outvoted, acquitted;
+    } table[] = {{HEATS_MV, 0.9f, true, true},
+                 {HEATS_MV, 0.87f, true, true}, /* 5 % of its own share */
+                 {HEATS_MV, 0.8f, true, false},
+                 {HOLDS_MV, 0.9f, false, true},
+                 {200.0f, 0.9f, false, false}}; /* offsets make an eighth of that */
+    for (unsigned n = 0; n < ROWS(table); n++) {
+        row(n);
+        circuit_window_t window =
+            window_of(table[n].share * table[n].own_mv, table[n].own_mv, 0.0f);
+        TEST_ASSERT_FALSE(circuit_peers_judge(&peers, SPRINGS, 0, &window, &source));
+        TEST_ASSERT_FLOAT_WITHIN(1e-3f, table[n].share, window.beside);
+        TEST_ASSERT_EQUAL(table[n].outvoted, window.outvoted);
+        TEST_ASSERT_EQUAL(table[n].acquitted, window.acquitted);
+    }
+    for (uint8_t k = 2; k < 4; k++) { /* one is left, which outvotes nobody */
+        is_off(k);
+    }
+    circuit_window_t window = window_of(0.9f * HEATS_MV, HEATS_MV, 0.0f);
+    TEST_ASSERT_FALSE(circuit_peers_judge(&peers, SPRINGS, 0, &window, &source));
+    TEST_ASSERT_FALSE(window.outvoted || window.acquitted);
 }
 
 /* Two that show what they ever did beside each other outvote a third one, whatever it showed in the

@@ -79,12 +79,38 @@ TEST(a_heating_and_a_hold_tell_supply_and_drop)
             TEST_ASSERT_FLOAT_WITHIN(0.04f * behind_mv(is, 230.0f), behind_mv(is, 230.0f),
                                      expected_mv(230.0f));
             rounds(springs > 1 ? 4 : 20, springs, is, 110.0f);
-            TEST_ASSERT_FLOAT_WITHIN(springs > 1 ? 25.0f : 60.0f, is.drop_mv, source.drop_mv);
+            TEST_ASSERT_FLOAT_WITHIN(springs > 1 ? 30.0f : 60.0f, is.drop_mv, source.drop_mv);
             TEST_ASSERT_FLOAT_WITHIN(springs > 1 ? 100.0f : 300.0f, is.supply_mv,
                                      circuit_source_supply_mv(&source));
             TEST_ASSERT_FLOAT_WITHIN(15.0f, behind_mv(is, 110.0f), expected_mv(110.0f));
-            TEST_ASSERT_TRUE(source.unsure_mv < (springs > 1 ? 60.0f : 120.0f));
+            TEST_ASSERT_TRUE(source.unsure_mv < (springs > 1 ? 75.0f : 120.0f));
         }
+    }
+}
+
+/* Some heat, some hold: what they show in one round is of one supply, whatever that does from round
+ * to round, as where the last of a heating leave a weak one. */
+TEST(a_round_of_several_duties_tells_them_whatever_the_supply_does)
+{
+    static const struct {
+        float supply_mv, more_mv, drop_mv; /* of the first round, and more at the last */
+        uint16_t declared_mv;
+    } cases[] = {
+        {4300, 400, 440, 0}, {5100, -500, 0, 0}, {4500, 300, 300, 390}, {5200, -400, 390, 0}};
+    for (unsigned n = 0; n < ROWS(cases); n++) {
+        circuit.freewheel_mv = cases[n].declared_mv;
+        circuit_source_begin(&source, &circuit);
+        for (unsigned turn = 0; turn <= 10; turn++) {
+            const true_t is = {cases[n].supply_mv + 0.1f * (float)turn * cases[n].more_mv,
+                               cases[n].drop_mv};
+            for (unsigned k = 0; k < 6; k++) { /* one after the other ends its heating */
+                const float duty = 2 * k < turn ? 100.0f : 230.0f;
+                circuit_source_take(&source, duty, behind_mv(is, duty));
+            }
+            (void)circuit_source_fit(&source, &circuit);
+        }
+        TEST_ASSERT_FLOAT_WITHIN(30.0f, cases[n].drop_mv, source.drop_mv);
+        TEST_ASSERT_TRUE(source.unsure_mv < 60.0f);
     }
 }
 
@@ -126,7 +152,7 @@ TEST(tolerances_bound_it)
         uint16_t declared_mv;
         float believed_mv, believed_drop_mv;
     } cases[] = {{2500, 0, 0, 4685, -1},    {9000, 0, 0, 5500, -1},  {5000, 1400, 0, -1, 500},
-                 {5000, 700, 390, -1, 510}, {5000, 0, 390, -1, 240}, {5000, 0, 100, -1, -1},
+                 {5000, 700, 390, -1, 540}, {5000, 0, 390, -1, 240}, {5000, 0, 100, -1, -1},
                  {5000, -400, 100, -1, 0},  {5000, -400, 0, -1, 0}};
     for (unsigned n = 0; n < ROWS(cases); n++) {
         const true_t is = {cases[n].supply_mv, cases[n].drop_mv};

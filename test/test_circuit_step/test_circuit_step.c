@@ -27,13 +27,17 @@ typedef struct {
 
 static const shown_t honest = {0.9f, 0.219f, 0.18f, 1.0f, 1.0f, 1.0f, 0.0f, 0.0f};
 
-static bool takes(shown_t s)
+static circuit_window_t window_of_shown(shown_t s)
 {
     const float a = (s.shown_a - s.offset_a) / s.current_gain;
     const float behind_mv = 1e3f * a * (s.spring_ohm + s.wiring_ohm);
     const float read_mv = 1e3f * a * s.spring_ohm * s.voltage_gain + s.offset_mv;
-    const circuit_window_t window =
-        window_of(read_mv + 1e3f * s.shown_a * 0.18f, behind_mv / s.supply, 1e3f * s.shown_a);
+    return window_of(read_mv + 1e3f * s.shown_a * 0.18f, behind_mv / s.supply, 1e3f * s.shown_a);
+}
+
+static bool takes(shown_t s)
+{
+    const circuit_window_t window = window_of_shown(s);
     return circuit_step_judge(&step, &window, &source, &circuit);
 }
 
@@ -125,6 +129,65 @@ TEST(what_is_no_lie_passes)
         after.spring_ohm *= 1.09f;
         after.supply *= 0.95f;
         TEST_ASSERT_EQUAL(0, found_after(before, after, 0.5f));
+    }
+}
+
+/* A window beside others that show so much of the supply, and outvote it or tell the same. */
+static bool takes_beside(shown_t s, float others, bool outvoted, bool acquitted)
+{
+    circuit_window_t window = window_of_shown(s);
+    window.beside = window.share / others;
+    window.outvoted = outvoted;
+    window.acquitted = acquitted;
+    return circuit_step_judge(&step, &window, &source, &circuit);
+}
+
+/* A supply that sags as many transform is what all show; a lie is not. */
+TEST(a_supply_that_moves_for_all_is_no_lie_of_one)
+{
+    for (unsigned how = 0; how < 4; how++) {
+        const bool outvoted = how == 0 || how == 3, acquitted = how == 1;
+        setUp();
+        for (unsigned n = 0; n < 5; n++) {
+            TEST_ASSERT_FALSE(takes_beside(honest, 1.0f, outvoted, acquitted));
+        }
+        shown_t after = honest;
+        after.spring_ohm *= how == 3 ? 1.0f : 0.8f;
+        after.supply = how == 3 ? 1.0f : 0.88f;
+        after.current_gain = how == 3 ? 0.8f : 1.0f;
+        bool found = false;
+        for (unsigned n = 0; n < CIRCUIT_STEP_WINDOWS; n++) {
+            found = takes_beside(after, after.supply, outvoted, acquitted);
+        }
+        TEST_ASSERT_EQUAL(how >= 2, found);
+    }
+}
+
+/* Of another kind than the shares before: those are nothing to compare with. */
+TEST(who_is_outvoted_at_last_begins_anew)
+{
+    for (unsigned first = 0; first < 2; first++) {
+        setUp();
+        for (unsigned n = 0; n < 10; n++) {
+            const bool outvoted = (n >= 5) == (first != 0);
+            shown_t s = honest;
+            s.spring_ohm *= n >= 5 ? 0.8f : 1.0f;
+            TEST_ASSERT_FALSE(takes_beside(s, 0.7f, outvoted, false));
+        }
+    }
+}
+
+/* One is as much of the others by whatever supply is believed. */
+TEST(another_supply_moves_nothing_beside_others)
+{
+    for (unsigned outvoted = 0; outvoted < 2; outvoted++) {
+        setUp();
+        (void)takes_beside(honest, 1.0f, outvoted != 0, false);
+        const uint16_t share_q12 = step.was[0].share_q12;
+        const circuit_source_t before = {.step_mv = 6.0f}, now = {.step_mv = 5.0f};
+        circuit_step_renew(&step, 1, &before, &now);
+        TEST_ASSERT_UINT_WITHIN(1, outvoted != 0 ? share_q12 : 1.2f * share_q12,
+                                step.was[0].share_q12);
     }
 }
 

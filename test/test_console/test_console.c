@@ -661,7 +661,7 @@ TEST(status_says_whether_the_stages_have_their_supply)
 {
     const char *const lines[] = {"supply on", "supply off", "$cut_off=0", "$cut_off=1"};
     const char *const ends[] = {"|supply:on>\r\n", "|supply:off>\r\n", "|supply:none>\r\n",
-                                "|supply:on>\r\n"};
+                                "|supply:off>\r\n"}; /* as it was */
     for (unsigned k = 0; k < 4; k++) {
         expect_ok(lines[k]);
         controller_tick(&controller, &inputs, &outputs);
@@ -669,6 +669,7 @@ TEST(status_says_whether_the_stages_have_their_supply)
         console_print_status(&console);
         TEST_ASSERT_EQUAL_STRING(ends[k], said + said_length - strlen(ends[k]));
     }
+    expect_ok("supply on");
     expect_ok("$cut_off=0");
     expect_error("supply off", CONSOLE_ERROR_NOT_AVAILABLE);
     TEST_ASSERT_EQUAL_STRING(

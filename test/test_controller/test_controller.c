@@ -148,7 +148,7 @@ TEST(each_current_loop_is_told_its_springs_resistance)
         for (uint8_t k = 0; k < 9; k++) {
             thermal_model_set_temperature(&controller.model, k, (int16_t)((85 + 2 * k) * 128));
         }
-        run(23); /* nine turns, nine for ceilings, five for the model */
+        run(30); /* a round: two in each turn in which no circuit and no ceiling is judged */
         for (uint8_t k = 0; k < 9; k++) {
             current_control_t told = controller.current;
             uint32_t resistance_uohm = thermal_model_resistance_uohm(&controller.model, k);
@@ -594,6 +594,22 @@ TEST(who_clears_a_welded_switch_again_waits)
     controller_clear_faults(&controller);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
     TEST_ASSERT_TRUE(controller_set_supply(&controller, true));
+}
+
+/* Without a relay nothing is off; what was switched off is so still where there is one after all.
+ */
+TEST(a_relay_that_is_declared_again_is_as_it_was)
+{
+    TEST_ASSERT_TRUE(controller_set_supply(&controller, false));
+    for (uint8_t cut_off = 0; cut_off < 2; cut_off++) {
+        settings.safety.cut_off = cut_off;
+        TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+        run(100);
+        TEST_ASSERT_EQUAL(cut_off != 0, controller_supply_is_off(&controller));
+        TEST_ASSERT_EQUAL(0, controller_supply_is_held(&controller));
+    }
+    TEST_ASSERT_TRUE(controller_set_supply(&controller, true));
+    TEST_ASSERT_FALSE(controller_supply_is_off(&controller));
 }
 
 /* Above the policy's limit, below safety's: after trip_time_s it is off, and says why. */

@@ -376,6 +376,38 @@ TEST(another_drop_moves_no_duty)
     }
 }
 
+/* Nor is another declaration of its circuit, right or wrong: what was learnt is what there is. Who
+ * is off begins as declared. */
+TEST(another_declaration_moves_no_duty)
+{
+    static const struct {
+        uint16_t supply_mv, wiring_mohm, freewheel_mv;
+    } declared[] = {{5000, 80, 0}, {5000, 120, 0}, {4500, 80, 0}, {5200, 60, 0}, {5000, 80, 380}};
+    for (unsigned n = 0; n < ROWS(declared); n++) {
+        setUp();
+        row(n);
+        load.supply_mv = 4500;
+        load.loop_mohm = 220;
+        control.channel[1].trim_q24 = 900 * 256;
+        current_control_set_resistance(&control, 1, 190);
+        mean_ua(2700, 100);
+        const uint16_t before = current_control_duty(&control, 0);
+        parameters.supply_mv = declared[n].supply_mv;
+        parameters.wiring_mohm = declared[n].wiring_mohm;
+        parameters.freewheel_mv = declared[n].freewheel_mv;
+        TEST_ASSERT_TRUE(current_control_apply(&control, &parameters, NULL));
+        for (int m = 0; m < 20; m++) {
+            TEST_ASSERT_INT_WITHIN(2, before, tick(2700)); /* dither */
+        }
+        TEST_ASSERT_INT32_WITHIN(8000, 2700000, mean_ua(2700, 20));
+        TEST_ASSERT_EQUAL_INT32(900 * 256, control.channel[1].trim_q24);
+        const int16_t estimate_q16 = control.channel[1].estimate_q16;
+        current_control_set_resistance(&control, 1, 190);
+        TEST_ASSERT_INT16_WITHIN(12, control.channel[1].estimate_q16,
+                                 estimate_q16); /* a milliohm */
+    }
+}
+
 /* To the last bit, of every channel that is driven, as far as its trim reaches. */
 TEST(another_drop_is_taken_from_every_trim)
 {
