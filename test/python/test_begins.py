@@ -11,20 +11,23 @@ import pytest
 from ninespring.find.diagnosis import fit_effects
 from ninespring.infer import predict as prediction
 from ninespring.infer import room
+from ninespring.infer.problem import Problem
+from ninespring.infer.scene import scene_of
 from ninespring.io.logs import log_text, read_log
 from ninespring.io.logs.run import Run
-from ninespring.model import native
+from ninespring.model import effects, native
 from ninespring.model.models import Array, Model
 from ninespring.model.simulate import settles_s
 
 ROWS, ROOM_C, HELD_W = 900, 20.0, 0.35
+PLATE = {"plate_coupling_w_per_k": 0.004, "plate_heat_capacity_j_per_k": 40.0, "plate_loss_w_per_k": 0.02}
 
 
-def cooling(effects: dict[str, dict[str, float]]) -> tuple[Model, Run]:
+def cooling(around: dict[str, dict[str, float]]) -> tuple[Model, Run]:
     """Return two springs that were held hot for long and cool as their log begins, one of them driven again later."""
     model = Model(Array(1, 2))
-    model.effects = list(effects)
-    model.parameters = {name: one for each in effects.values() for name, one in each.items()} | {"ambient_c": ROOM_C}
+    model.effects = list(around)
+    model.parameters = {name: one for each in around.values() for name, one in each.items()} | {"ambient_c": ROOM_C}
     plant = prediction.plant_of(model)
     plant.reset()
     for k in range(2):
@@ -41,13 +44,7 @@ def cooling(effects: dict[str, dict[str, float]]) -> tuple[Model, Run]:
     "around",
     [
         {"shared_air": {"air_heat_capacity_j_per_k": 40.0, "air_exchange_w_per_k": 0.02}},
-        {
-            "plate_conduction": {
-                "plate_coupling_w_per_k": 0.004,
-                "plate_heat_capacity_j_per_k": 40.0,
-                "plate_loss_w_per_k": 0.02,
-            }
-        },
+        {"plate_conduction": PLATE},
         {"holder_mass": {"holder_coupling_w_per_k": 0.004, "holder_heat_capacity_j_per_k": 2.0}},
     ],
     ids=["air", "plate", "holders"],
@@ -226,3 +223,22 @@ def test_where_others_were_warmed_together_a_run_as_warm_is_not_at_rest() -> Non
     short.temperature_c[:] = 32.0 + np.random.default_rng(1).normal(0.0, 0.1, short.temperature_c.shape)
     assert room.rested([short, short]) == [True, True]
     assert room.rested([warm, short]) == [False, False]
+
+
+def test_what_is_around_springs_that_were_warmed_shortly_before_is_told_by_the_run() -> None:
+    """A minute of heat warms no plate: one as warm as beside springs held so for long is not what the readings show."""
+    model, run = cooling({"plate_conduction": PLATE})
+    plant = prediction.plant_of(model)
+    plant.reset()
+    plant.start_from_measured(run.temperature_c[0])
+    shown = plant.simulate(run.time_s, native.POWER, run.drive, run.fan, run.ambient_c)
+    rng = np.random.default_rng(1)
+    fresh = replace(run, temperature_c=shown + rng.normal(0.0, 0.05, shown.shape))
+    soaked = replace(run, temperature_c=run.temperature_c + rng.normal(0.0, 0.05, shown.shape))
+    _, found, _ = fit_effects(Array(1, 2), [fresh, soaked], ["plate_conduction"])
+    assert found.value("around_share@1") < 0.1 and found.value("around_share@2") > 0.9
+    assert np.sqrt(found.sse / found.count) < 1.1
+    model.provenance = {"around_share": 0.0}
+    assert np.abs(shown - prediction.predict(model, replace(run, temperature_c=shown))).max() < 0.05
+    cold = replace(run, temperature_c=np.where(run.time_s < 1.0, ROOM_C, run.temperature_c.T).T)
+    assert not any("around" in f.key for c in effects.candidates(scene_of(Problem(Array(1, 2), [cold]))) for f in c.free)

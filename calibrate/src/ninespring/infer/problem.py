@@ -23,7 +23,7 @@ from ..io.logs.run import Run
 from ..model import native
 from ..model.models import Array
 from ..model.simulate import array_parameters, fades_per_s, hidden_k, simulate_run
-from ..model.spec import AMBIENT_OFFSET, DRIVE_GAIN, RUN_DRIVE, SENSOR_OFFSET, Spec, Values
+from ..model.spec import AMBIENT_OFFSET, AROUND_SHARE, DRIVE_GAIN, RUN_DRIVE, SENSOR_OFFSET, Spec, Values
 from .budget import Budget
 from .descent import Descent, Shown
 from .fit import Fit
@@ -202,12 +202,17 @@ class Problem:
                 plant.set(f"command_power_w[{k + 1}]", gain * plant.get(f"command_power_w[{k + 1}]"))
         return plant
 
+    def begun(self, run_index: int, values: Mapping[str, float]) -> Run:
+        """Return a run as it was read, with what was around its springs as warm as these numbers have it."""
+        run, share = self.runs[run_index], values.get(f"{AROUND_SHARE}@{run_index + 1}")
+        return run if share is None else replace(run, around_share=share)
+
     def run_of(self, run_index: int, values: Mapping[str, float]) -> Run:
         """Return a run with what is its own put right: driven as strongly as it was, read as if nothing were off.
 
         A command's strength is the plant's (`plant_for`).
         """
-        run = self.runs[run_index]
+        run = self.begun(run_index, values)
         gain = values.get(f"{DRIVE_GAIN}@{run_index + 1}", 1.0)
         off_k = values.get(f"{SENSOR_OFFSET}@{run_index + 1}", 0.0)
         if gain != 1.0 and run.mode != "command":

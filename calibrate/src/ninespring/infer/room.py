@@ -19,8 +19,9 @@ from ..io import statistics
 from ..io.logs.run import Run
 from ..model import native
 from ..model.effects.ambient_drift import MOST_K_PER_H
+from ..model.simulate import WARM_K as BEGINS_WARM_K
 from ..model.simulate import fades_per_s, hidden_k, simulate_run
-from ..model.spec import AMBIENT_OFFSET, SENSOR_OFFSET
+from ..model.spec import AMBIENT_OFFSET, AROUND_SHARE, SENSOR_OFFSET
 
 FIRST_S = 60.0
 """Of a run, what it is told by."""
@@ -140,6 +141,12 @@ def coldest_c(run: Run) -> float:
     )
 
 
+def begins_warm(run: Run) -> bool:
+    """Return whether a run begins with a spring that was heated before, by its room, or by the coldest that its thermometers fall to."""
+    room_c = coldest_c(run) if run.ambient_c is None else float(run.ambient_c[0])
+    return not run.warm and bool(np.nanmax(run.temperature_c[0], initial=room_c) > room_c + BEGINS_WARM_K)
+
+
 def rested(runs: Sequence[Run]) -> list[bool]:
     """Return which runs began at their room: thermometers together and still, no hotter than rooms are nor than they differ from the
     coldest such start.
@@ -197,6 +204,12 @@ def believed(runs: Sequence[Run]) -> list[tuple[float, float]]:
     usual, off = (float(np.mean(rooms)), 3.0 * ROOMS_K) if rooms else (0.0, math.inf)
     about = [(first, 2.0 * MOVES_K, math.inf) if cold else (usual, off, coldest_c(run)) for run, first, cold in began]
     return [(middle - off, max(middle - off + MOVES_K, min(middle + off, most + TOGETHER_K))) for middle, off, most in about]
+
+
+def around_share(values: Mapping[str, float]) -> float | None:
+    """Return the mean share of warm springs' warmth that was around them as runs began, by a fit's numbers; None where it has none."""
+    each = [value for key, value in values.items() if key.partition("@")[0] == AROUND_SHARE]
+    return float(np.mean(each)) if each else None
 
 
 def over_first(runs: Sequence[Run], ambient_c: Sequence[float]) -> tuple[float, float] | None:
