@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ninespring.find import doubt
 from ninespring.find.diagnosis import fit_effects
 from ninespring.infer import predict as prediction
 from ninespring.infer import room
@@ -241,4 +242,19 @@ def test_what_is_around_springs_that_were_warmed_shortly_before_is_told_by_the_r
     model.provenance = {"around_share": 0.0}
     assert np.abs(shown - prediction.predict(model, replace(run, temperature_c=shown))).max() < 0.05
     cold = replace(run, temperature_c=np.where(run.time_s < 1.0, ROOM_C, run.temperature_c.T).T)
-    assert not any("around" in f.key for c in effects.candidates(scene_of(Problem(Array(1, 2), [cold]))) for f in c.free)
+    assert not any(
+        "around" in f.key for c in effects.candidates(scene_of(Problem(Array(1, 2), [cold]))) for f in c.free
+    )
+
+
+def test_a_room_that_would_lie_beyond_where_its_run_began_is_said() -> None:
+    """Thermometers that begin at rest and then show what no room of theirs explains."""
+    off = [alike(ROOM_C, seed) for seed in (1, 2)]
+    for run in off:
+        run.temperature_c[61:] -= 2.4
+    problem, found, _ = fit_effects(Array(1, 2), off, [])
+    said = doubt.of_rooms(problem, found)
+    assert len(said) == 2 and "log ambient_c" in said[0] and "18.0 degC" in said[0]
+    assert set(said) <= {*doubt.model_of_fit(problem, found, off)[1]}
+    problem, found, _ = fit_effects(Array(1, 2), [alike(ROOM_C, seed) for seed in (1, 2)], [])
+    assert doubt.of_rooms(problem, found) == []

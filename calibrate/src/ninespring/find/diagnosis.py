@@ -724,7 +724,7 @@ def _warned(
             if one.share > MOST_OF_IT and effect in effects.IN_WORDS
         ]
     doubts = doubt.of_log(problem, problem.runs, case.swapped, (base,) if final is base else (base, final), left_over)
-    return warnings + doubts + [*impossible, *doubt.about_power(problem), *plausibility.coarse(runs)], doubts
+    return warnings + doubts + [*impossible, *doubt.not_logged(problem, final), *plausibility.coarse(runs)], doubts
 
 
 def _counts(one: unnamed.Hidden) -> bool:

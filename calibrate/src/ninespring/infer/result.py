@@ -100,7 +100,9 @@ def model_of(
     if (share := room.around_share(fit.as_dict())) is not None:
         model.provenance["around_share"] = share
     if rooms:
-        told = room.Rooms.of([problem.begun(r, fit.as_dict()) for r in rooms], constants, problem.plant_for(fit.spec, fit.values))
+        told = room.Rooms.of(
+            [problem.begun(r, fit.as_dict()) for r in rooms], constants, problem.plant_for(fit.spec, fit.values)
+        )
         model.provenance["room_spread_k"] = told.spread_k
         model.provenance["room_first_minute_misses_k"] = told.misses_k
         if told.over:

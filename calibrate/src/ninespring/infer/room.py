@@ -136,7 +136,11 @@ def coldest_c(run: Run) -> float:
     """Return the lowest that any thermometer of a run falls to, degC: its room is no warmer, heat only warms."""
     there = np.isfinite(run.temperature_c)
     return min(
-        (_coldest(run.time_s[one], shown[one])[0] for one, shown in zip(there.T, run.temperature_c.T, strict=True) if one.any()),
+        (
+            _coldest(run.time_s[one], shown[one])[0]
+            for one, shown in zip(there.T, run.temperature_c.T, strict=True)
+            if one.any()
+        ),
         default=math.inf,
     )
 
@@ -203,7 +207,9 @@ def believed(runs: Sequence[Run]) -> list[tuple[float, float]]:
     rooms = [first for _, first, cold in began if cold]
     usual, off = (float(np.mean(rooms)), 3.0 * ROOMS_K) if rooms else (0.0, math.inf)
     about = [(first, 2.0 * MOVES_K, math.inf) if cold else (usual, off, coldest_c(run)) for run, first, cold in began]
-    return [(middle - off, max(middle - off + MOVES_K, min(middle + off, most + TOGETHER_K))) for middle, off, most in about]
+    return [
+        (middle - off, max(middle - off + MOVES_K, min(middle + off, most + TOGETHER_K))) for middle, off, most in about
+    ]
 
 
 def around_share(values: Mapping[str, float]) -> float | None:
