@@ -29,14 +29,16 @@ from ninespring.model.spec import Spec
 from two_heaters import levels
 
 
-def commanded(path: Path, on: dict[str, dict[str, float]], seed: int = 0) -> Path:
+def commanded(path: Path, on: dict[str, dict[str, float]], seed: int = 0, all_or_none: bool = False) -> Path:
     """Write a 1 x 2 log of 600 s at 1 Hz where only the command is known, as two heaters on an Arduino give it."""
     rng = np.random.default_rng(seed)
     time_s = np.arange(600.0)
     drive = levels(rng)
+    if all_or_none:
+        drive = np.where(drive > 0.0, 1.0, 0.0)
     plant = native.Plant(1, 2)
     plant.set_all({"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.012, "orthogonal_w_per_k": 0.004})
-    plant.set_all({"command_power_w[1]": 0.8, "command_power_w[2]": 0.4})
+    plant.set_all({"command_power_w[1]": 0.8, "command_power_w[2]": 0.8 if all_or_none else 0.4})
     plant.set_effects(on)
     for values in on.values():
         plant.set_all(values)
@@ -320,6 +322,24 @@ def test_the_way_the_supply_sags_is_told_from_the_other(tmp_path: Path, chopped:
     assert found.result["unexplained"] is False
     shown = predict(found.model, run)
     assert np.sqrt(np.nanmean((run.temperature_c - shown) ** 2)) < 0.06
+
+
+@pytest.mark.parametrize("chopped", [1.0, 0.0])
+def test_of_commands_that_are_all_or_none_the_way_the_supply_sags_is_not_told(tmp_path: Path, chopped: float) -> None:
+    """That it sags is certain all the same; the other law is a rival, with commands in between to tell it by."""
+    sag = {"supply_sag": {"supply_resistance_ohm": 8.0, "supply_chopped": chopped}}
+    run = read_log(commanded(tmp_path / "log.csv", sag, all_or_none=True), 2)
+    found = diagnosis.diagnose(Array(1, 2), [run], model=heaters())
+    (one,) = found.told.effects
+    assert one.name == "supply_sag" and one.certainty == "certain"
+    assert one.text.count("The supply sags under load") == 2 and one.text.endswith("do not tell which.")
+    (rival,) = found.told.rivals
+    assert rival.name == "supply_sag" and {rival.variant, one.variant} == {
+        "chopped loads",
+        "loads that draw their mean",
+    }
+    assert rival.experiment is not None and rival.experiment.difference_c > 1.0
+    assert any(0 < share < 100 for step in rival.experiment.steps for share in step.percent)
 
 
 def names_of(problem: Problem) -> set[str]:

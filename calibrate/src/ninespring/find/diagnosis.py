@@ -209,6 +209,8 @@ def rivals_of(
     seen = set()
     for instead, other in sorted(contenders, key=lambda one: one[1].chi2):
         extra = [e for e in other.spec.effects if e not in final.spec.effects]
+        if not extra and _another_law(final, other, instead):
+            extra = [instead]
         if instead not in adopted or not extra or (instead, extra[0]) in seen:
             continue
         apart = difference(problem, final, other)
@@ -236,6 +238,12 @@ def rivals_of(
     return rivals
 
 
+def _another_law(one: Fit, other: Fit, effect: str) -> bool:
+    """Return whether two fits have an effect with the same numbers by two laws."""
+    keys = [{free.key for free in fit.spec.free if free.effect == effect} for fit in (one, other)]
+    return keys[0] == keys[1] != set() and variant_of(one, effect) != variant_of(other, effect)
+
+
 def share_with(listed: Sequence[results.Effect], rivals: Sequence[results.Rival], same_c: float) -> None:
     """Share what speaks for a named effect with rivals that show the same readings: only the two in combination are fixed.
 
@@ -250,9 +258,11 @@ def share_with(listed: Sequence[results.Effect], rivals: Sequence[results.Rival]
         if not alike:
             continue
         instead = [effects.sentence(one.name, one.parameters, one.variant or "") for one in alike]
-        entry.probability /= 1 + len(alike)
-        entry.certainty = "probable"
-        entry.text += f" Or: {' Or: '.join(instead)} These readings fix them only in combination."
+        if others := sum(one.name != entry.name for one in alike):  # by another law it is the same name
+            entry.probability /= 1 + others
+            entry.certainty = "probable"
+        untold = "fix them only in combination" if others else "do not tell which"
+        entry.text += f" Or: {' Or: '.join(instead)} These readings {untold}."
 
 
 def candidates_of(found: search.Search, final: Fit, base: Fit) -> list[results.Candidate]:

@@ -39,6 +39,8 @@ class Candidate:
     """Follows anything slow: it must beat a physical cause clearly."""
     alternatives: bool = False
     """Its probes are places to start from, not directions to be combined: the best one counts."""
+    law: bool = False
+    """One of the laws that its effect's number may be of: what is on or off may not tell them apart, and all are fitted."""
     slow_node: bool = False
     """A slow cause that a flexible one hides: tried in its place whatever the forecast says."""
 
