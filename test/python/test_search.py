@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from command import ended
 from made import searched
+from ninespring.errors import InputError
 from ninespring.find import diagnosis, evidence, experiments, residual, search
 from ninespring.find.plan import plan_experiment
 from ninespring.infer import budget, room
@@ -380,9 +381,19 @@ def test_only_what_the_log_could_show_is_a_candidate(make_log, tmp_path: Path) -
     both = read_log(commanded(tmp_path / "u.csv", {}), 2)
     pair = names_of(Problem(Array(1, 2), [both]))
     assert {"supply_sag", "holder_mass"} <= pair and "edge_loss" not in pair
-    one = replace(both, drive=both.drive[:, :1], temperature_c=both.temperature_c[:, :1])
+    one = replace(both, drive=both.drive[:, :1], temperature_c=both.temperature_c[:, :1], rounding_c=None)
     alone = names_of(Problem(Array(1, 1), [one]))
     assert "plate_conduction" in alone and "holder_mass" not in alone, "of a spring alone both are the same"
+    with pytest.raises(InputError, match="what a spring alone is mounted on is plate_conduction"):
+        diagnosis.fit_effects(Array(1, 1), [one], ["holder_mass"])
+    plates = [
+        next(c for c in effects.candidates(scene_of(Problem(array, [run]))) if c.effect == "plate_conduction")
+        for array, run in ((Array(1, 1), one), (Array(1, 2), both))
+    ]
+    numbers = {"plate_coupling_w_per_k": results.Number(value=0.002, stderr=0.0001, unit="W/K")}
+    said = [effects.sentence(one.effect, numbers, one.variant) for one in plates]
+    assert said[0].startswith("Behind the spring") and said[1].startswith("The springs share a plate")
+    assert "common" not in effects.in_words(plates[0].effect, plates[0].variant)
 
 
 def test_every_probe_is_within_its_bounds_and_moves_what_is_seen(make_log, tmp_path: Path) -> None:

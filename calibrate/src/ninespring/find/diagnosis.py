@@ -693,12 +693,16 @@ def _left(case: _Case, left_over: bool) -> results.Residual:
     problem, final = case.problem, case.final
     rho = statistics.autocorrelation([r / n for r, n in zip(final.residual, problem.noise, strict=True)], 1)
     depends, note = depends_on(problem, final)
+    structure_c = math.sqrt(excess(problem, final)) * problem.noise_c
     if left_over:
-        note = ("structure well above the noise remains that no effect of the library explains. " + note).strip()
+        note = (
+            f"structure of {structure_c:.2g} K rms remains, beside noise of {problem.noise_c:.2g} K, that no effect of the library "
+            f"explains. {note}"
+        ).strip()
     noise = np.sqrt(np.nanmean(np.square(np.asarray(problem.noise)), axis=0))
     return results.Residual(
         autocorrelation_lag1=float(np.clip(rho[1], -1.0, 1.0)),
-        structure_c=math.sqrt(excess(problem, final)) * problem.noise_c,
+        structure_c=structure_c,
         rmse_per_spring_c=[finite(v) for v in doubt.per_spring(final.residual)],
         noise_per_spring_c=[finite(v) for v in noise],
         depends_on=depends,
@@ -875,4 +879,6 @@ def _cannot_show(effect: str, runs: Sequence[Run]) -> InputError:
     seen = "nothing in it depends on it"
     if effect in resistance.OF_THE_WIRE:
         seen = "no temperature depends on it, and v / i tells it of springs that stay in each phase for half a minute"
+    if effect == "holder_mass" and runs[0].springs == 1:
+        seen = "what a spring alone is mounted on is plate_conduction, which the chip has"
     return InputError(f"{effect} cannot show here{more}: {seen}", runs[0].name)
