@@ -217,6 +217,13 @@ def test_one_thermometer_of_three_that_comes_loose_is_no_run_that_cools() -> Non
     assert not room.moves(replace(run, temperature_c=three, drive=run.drive[:, [0, 1, 1]]))
 
 
+def test_a_run_that_cools_in_its_first_minute_is_not_told_to_begin_as_those_at_rest() -> None:
+    over = (0.0, 0.3)
+    assert len(room.guessed(alike(ROOM_C, 1), ROOM_C, over)) == 2
+    (one,) = room.guessed(alike(28.0, 1), ROOM_C, over)
+    assert (one.room_c, one.sigma_k) == (ROOM_C, room.ROOMS_K)
+
+
 def test_where_others_were_warmed_together_a_run_as_warm_is_not_at_rest() -> None:
     """That it hardly moves in the seconds before it is driven says little: rooms of two days are not so far apart."""
     warm, short = alike(32.0, 1), alike(32.0, 2)

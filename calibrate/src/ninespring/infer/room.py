@@ -283,11 +283,12 @@ def guessed(run: Run, usual_c: float, over: tuple[float, float] | None, spread_k
     """Return what is believed of a run's room before it moves.
 
     Rooms of other days say one thing. What other runs began like says another, if this one began so, too: it may have begun warm,
-    and is then anywhere within WARM_K above its room. Where its thermometers are apart it did, but for the coldest, perhaps.
+    and is then anywhere within WARM_K above its room. Where its thermometers are apart it did, but for the coldest, perhaps; where they
+    move in its first minute it did.
     """
     warm = Guess(0.0, usual_c, spread_k)
     first, apart = _begins_at(run)
-    if over is None or not math.isfinite(first):
+    if over is None or not math.isfinite(first) or moves(begun(run) or run):
         return [warm]
     here = first + over[0]
     both = warm.with_told(here, over[1] ** 2)
