@@ -652,12 +652,21 @@ def _errors(case: _Case, before: Fit) -> tuple[results.Baseline, results.After]:
     return baseline, after
 
 
+def _at_an_end(fit: Fit, effect: str) -> bool:
+    """Return whether a number of an effect lies at its bound, beyond which would be no such effect; or a room, for which anything may
+    make up."""
+    return any(
+        free.effect == effect or free.key.startswith("ambient_c@")
+        for free in fit.spec.free
+        if free.key in fit.at_bounds()
+    )
+
+
 def _listed(
     case: _Case, steps: Sequence[tuple[str, Fit]], strength: Mapping[str, float]
 ) -> tuple[list[results.Effect], list[results.RunsDiffer]]:
     """Return the effects of the array, the one that explains most first, and what is a run's own."""
     problem, final = case.problem, case.final
-    bounds = set(final.at_bounds())
     listed, differ = [], []
     for effect, growing in steps:
         sure = case.witnesses[effect]
@@ -665,8 +674,7 @@ def _listed(
             differ.append(runs_apart.entry(problem, final, effect, strength[effect], sure))
             continue
         probability = max(NAMED, sure.probability())  # where less, what was not seen tells of it
-        if bounds & {free.key for free in final.spec.free if free.effect == effect}:
-            # what would be beyond it is no such effect
+        if _at_an_end(final, effect):
             probability = min(probability, PROBABLE)
         parameters, variant = parameters_of(problem, final, effect), variant_of(final, effect)
         listed.append(

@@ -165,7 +165,7 @@ class Effect:
         """Return the ways it could be there, its name filled in; what keeps heat has how much of it each warm run began with, too."""
         warm = scene.warm if self.name in AROUND else ()
         begun = [
-            Free(f"{AROUND_SHARE}@{r + 1}", 0.5, 0.0, 1.0, "1", run=r, scale=0.5, prior=1.0, ends=True) for r in warm
+            Free(f"{AROUND_SHARE}@{r + 1}", 1.0, 0.0, 1.0, "1", run=r, scale=0.5, prior=1.0, ends=True) for r in warm
         ]
         cold = ({free.key: 0.0 for free in begun},) if begun else ()
         return [
