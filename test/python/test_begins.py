@@ -2,27 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from ninespring.find import doubt
 from ninespring.find.diagnosis import fit_effects
 from ninespring.infer import predict as prediction
+from ninespring.infer import room
+from ninespring.infer.problem import Problem
+from ninespring.infer.scene import scene_of
 from ninespring.io.logs import log_text, read_log
 from ninespring.io.logs.run import Run
-from ninespring.model import native
+from ninespring.model import effects, native
 from ninespring.model.models import Array, Model
 from ninespring.model.simulate import settles_s
 from plants import a_plant
 
 ROWS, ROOM_C, HELD_W = 900, 20.0, 0.35
+PLATE = {"plate_coupling_w_per_k": 0.004, "plate_heat_capacity_j_per_k": 40.0, "plate_loss_w_per_k": 0.02}
 
 
-def cooling(effects: dict[str, dict[str, float]]) -> tuple[Model, Run]:
+def cooling(around: dict[str, dict[str, float]]) -> tuple[Model, Run]:
     """Return two springs that were held hot for long and cool as their log begins, one of them driven again later."""
     model = Model(Array(1, 2))
-    model.effects = list(effects)
-    model.parameters = {name: one for each in effects.values() for name, one in each.items()} | {"ambient_c": ROOM_C}
+    model.effects = list(around)
+    model.parameters = {name: one for each in around.values() for name, one in each.items()} | {"ambient_c": ROOM_C}
     plant = prediction.plant_of(model)
     plant.reset()
     for k in range(2):
@@ -39,13 +46,7 @@ def cooling(effects: dict[str, dict[str, float]]) -> tuple[Model, Run]:
     "around",
     [
         {"shared_air": {"air_heat_capacity_j_per_k": 40.0, "air_exchange_w_per_k": 0.02}},
-        {
-            "plate_conduction": {
-                "plate_coupling_w_per_k": 0.004,
-                "plate_heat_capacity_j_per_k": 40.0,
-                "plate_loss_w_per_k": 0.02,
-            }
-        },
+        {"plate_conduction": PLATE},
         {"holder_mass": {"holder_coupling_w_per_k": 0.004, "holder_heat_capacity_j_per_k": 2.0}},
     ],
     ids=["air", "plate", "holders"],
@@ -145,3 +146,116 @@ def test_a_log_alone_that_begins_at_rest_begins_at_its_room_whatever_its_model_l
     shown += np.random.default_rng(1).normal(0.0, 0.1, shown.shape)
     run = Run("run", "", time_s, "power", drive, shown, np.zeros(200), None)
     assert fit_effects(Array(1, 1), [run], [])[1].value("ambient_c@1") == pytest.approx(ROOM_C, abs=1.0)
+
+
+def alike(start_c: float, seed: int, heats: bool = True) -> Run:
+    """Return two springs that begin together, nothing driven for two minutes, in a room that nobody logged."""
+    rng = np.random.default_rng(seed)
+    rows = 600
+    drive = np.zeros((rows, 2))
+    for k in range(2):
+        for at in range(120 + 20 * k, rows if heats else 0, 90):
+            drive[at : at + int(rng.integers(30, 80)), k] = rng.uniform(0.2, 0.4)
+    plant = native.Plant(1, 2)
+    plant.set_all({"loss_w_per_k": 0.006, "orthogonal_w_per_k": 0.0006})
+    plant.set_ambient(ROOM_C)
+    plant.reset()
+    for k in range(2):
+        plant.set_temperature(k, start_c)
+    time_s = np.arange(float(rows))
+    shown = plant.simulate(time_s, native.POWER, drive, np.zeros(rows), np.full(rows, ROOM_C))
+    return Run("run", "", time_s, "power", drive, shown + rng.normal(0.0, 0.1, shown.shape), np.zeros(rows), None)
+
+
+def test_runs_that_begin_warm_and_cool_are_in_the_room_to_which_they_do() -> None:
+    """All springs alike, and below 35 degC, as at rest: their first minutes' means were taken for rooms of 25 degC."""
+    _, found, _ = fit_effects(Array(1, 2), [alike(33.0, 1), alike(32.0, 2)], [])
+    assert [found.value(f"ambient_c@{r}") for r in (1, 2)] == pytest.approx([ROOM_C, ROOM_C], abs=0.1)
+    assert found.value("loss_w_per_k") == pytest.approx(0.006, rel=0.02)
+
+
+def test_a_room_is_looked_for_no_higher_than_a_thermometer_falls() -> None:
+    warm, rests = alike(33.0, 1), alike(ROOM_C, 2)
+    for bound in room.believed([warm, warm]):
+        assert bound[0] == -np.inf and ROOM_C + 2.0 < bound[1] < ROOM_C + 2.0 * room.TOGETHER_K
+    colder = replace(warm, temperature_c=warm.temperature_c - 8.0)
+    assert room.believed([rests, rests, colder])[2][1] < ROOM_C, "colder than the others' rooms say"
+
+
+@pytest.mark.parametrize(
+    ("change", "moves"),
+    [
+        (lambda s: 0.0 * s, False),
+        (lambda s: -0.3 * s / 60.0, False),
+        (lambda s: -1.5 * s / 60.0, True),
+        (lambda s: 1.5 * s / 60.0, True),
+        (lambda s: np.where(s > 300.0, -5.0, 0.0), True),
+        (lambda s: np.where(s > 300.0, -3.0, 0.0), False),
+    ],
+    ids=["rests", "as its room", "falls", "rises", "falls later", "as a room in that time"],
+)
+def test_a_run_is_at_rest_where_it_moves_no_faster_than_noise_and_rooms(
+    change: Callable[[np.ndarray], np.ndarray], moves: bool
+) -> None:
+    run = alike(ROOM_C, 3, heats=False)
+    one = replace(run, temperature_c=run.temperature_c + change(run.time_s)[:, None])
+    assert room.moves(one) is moves
+    assert room.rested([one, one]) == [not moves] * 2
+    assert (room.rests_alone([one]) is None) is moves
+    assert (room.above_logged(replace(one, ambient_c=np.full(len(run.time_s), ROOM_C))) is None) is moves
+
+
+def test_one_thermometer_of_three_that_comes_loose_is_no_run_that_cools() -> None:
+    run = alike(ROOM_C, 3, heats=False)
+    three = np.column_stack([run.temperature_c, run.temperature_c[:, 0] - np.where(run.time_s > 30.0, 9.0, 0.0)])
+    assert not room.moves(replace(run, temperature_c=three, drive=run.drive[:, [0, 1, 1]]))
+
+
+def test_a_run_that_cools_in_its_first_minute_is_not_told_to_begin_as_those_at_rest() -> None:
+    over = (0.0, 0.3)
+    assert len(room.guessed(alike(ROOM_C, 1), ROOM_C, over)) == 2
+    (one,) = room.guessed(alike(28.0, 1), ROOM_C, over)
+    assert (one.room_c, one.sigma_k) == (ROOM_C, room.ROOMS_K)
+
+
+def test_where_others_were_warmed_together_a_run_as_warm_is_not_at_rest() -> None:
+    """That it hardly moves in the seconds before it is driven says little: rooms of two days are not so far apart."""
+    warm, short = alike(32.0, 1), alike(32.0, 2)
+    short.drive[3:] = 0.3
+    short.temperature_c[:] = 32.0 + np.random.default_rng(1).normal(0.0, 0.1, short.temperature_c.shape)
+    assert room.rested([short, short]) == [True, True]
+    assert room.rested([warm, short]) == [False, False]
+
+
+def test_what_is_around_springs_that_were_warmed_shortly_before_is_told_by_the_run() -> None:
+    """A minute of heat warms no plate: one as warm as beside springs held so for long is not what the readings show."""
+    model, run = cooling({"plate_conduction": PLATE})
+    plant = prediction.plant_of(model)
+    plant.reset()
+    plant.start_from_measured(run.temperature_c[0])
+    shown = plant.simulate(run.time_s, native.POWER, run.drive, run.fan, run.ambient_c)
+    rng = np.random.default_rng(1)
+    fresh = replace(run, temperature_c=shown + rng.normal(0.0, 0.05, shown.shape))
+    soaked = replace(run, temperature_c=run.temperature_c + rng.normal(0.0, 0.05, shown.shape))
+    _, found, _ = fit_effects(Array(1, 2), [fresh, soaked], ["plate_conduction"])
+    assert found.value("around_share@1") < 0.1 and found.value("around_share@2") > 0.9
+    assert np.sqrt(found.sse / found.count) < 1.1
+    model.provenance = {"around_share": 0.0}
+    assert np.abs(shown - prediction.predict(model, replace(run, temperature_c=shown))).max() < 0.05
+    cold = replace(run, temperature_c=np.where(run.time_s < 1.0, ROOM_C, run.temperature_c.T).T)
+    assert not any(
+        "around" in f.key for c in effects.candidates(scene_of(Problem(Array(1, 2), [cold]))) for f in c.free
+    )
+
+
+def test_a_room_that_would_lie_beyond_where_its_run_began_is_said() -> None:
+    """Thermometers that begin at rest and then show what no room of theirs explains."""
+    off = [alike(ROOM_C, seed) for seed in (1, 2)]
+    for run in off:
+        run.temperature_c[61:] -= 2.4
+    problem, found, _ = fit_effects(Array(1, 2), off, [])
+    said = doubt.of_rooms(problem, found)
+    assert len(said) == 2 and "log ambient_c" in said[0] and "18.0 degC" in said[0]
+    assert set(said) <= {*doubt.model_of_fit(problem, found, off)[1]}
+    problem, found, _ = fit_effects(Array(1, 2), [alike(ROOM_C, seed) for seed in (1, 2)], [])
+    assert doubt.of_rooms(problem, found) == []

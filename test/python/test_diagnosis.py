@@ -22,6 +22,7 @@ from ninespring.io import results
 from ninespring.io.logs import read_log
 from ninespring.model import native
 from ninespring.model.models import Array
+from ninespring.model.spec import Free, Spec
 
 PUBLISHED = jsonschema.Draft202012Validator(json.loads(results.schema("diagnosis")))
 
@@ -214,3 +215,12 @@ def test_what_explains_most_and_is_not_named_all_the_same_is_said(make_log, monk
     found = diagnosis.diagnose(Array(), [read_log(make_log(effects={"plate_conduction": {}}))]).result
     assert not found["effects"] and found["unexplained"]
     assert any("plate_conduction" in one and "40% likely, it is not named" in one for one in found["warnings"])
+
+
+def test_beside_a_room_at_its_bound_no_name_is_certain() -> None:
+    room = Free("ambient_c@1", 20.0, 20.0, 24.0, "degC", run=0)
+    edge = Free("edge_loss_fraction", 0.2, 0.0, 1.0, "1", effect="edge_loss")
+    for room_c, fraction, ends in ((20.0, 0.2, True), (22.0, 0.2, False), (22.0, 1.0, True)):
+        fit = Fit(Spec(("edge_loss",), free=(room, edge)), np.array([room_c, fraction]), 0.0, 1, [])
+        assert diagnosis._at_an_end(fit, "edge_loss") is ends
+        assert diagnosis._at_an_end(fit, "radiation") is (room_c == 20.0)

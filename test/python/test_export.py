@@ -309,6 +309,17 @@ def test_one_judgement_says_what_goes_into_the_chip_and_how_to_have_it_go(tmp_pa
     assert "on 5 100" in (tmp_path / "steps.txt").read_text()
 
 
+def test_a_declared_number_of_an_effect_is_none_that_was_found(tmp_path: Path) -> None:
+    """Martensite's resistance is array.toml's; austenite's was found by no voltages: the effect does not go into the chip."""
+    model = Model(Array(1, 1, material={"austenite_finish_c": 94.0}))
+    model.effects = ["resistance_phase"]
+    model.parameters, model.stderr = {"resistance_austenite_ohm": 0.159}, {"resistance_austenite_ohm": 0.002}
+    model.kept = {"resistance_austenite_ohm": "no voltages were logged"}
+    one = an_effect("resistance_phase", on_chip=True)
+    judged([one], model)
+    assert not one.on_chip and one.why_not_on_chip == "no voltages were logged"
+
+
 def test_what_is_not_written_never_names_a_spring_that_is() -> None:
     kept = dict.fromkeys(("wire_1", "wire_3", "loss_1", "loss_2", "area_mm2"), "unknown")
     assert together(kept, {"wire_2": "1"}) == {"unknown": ["wire_1", "wire_3", "loss", "area_mm2"]}

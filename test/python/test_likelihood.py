@@ -202,7 +202,7 @@ def test_rooms_that_were_alike_tell_more_than_what_a_run_begins_at() -> None:
     """They were so though their runs began as far apart as a board cools from run to run."""
     tells_nothing = native.Plant(1, 1)
     tells_nothing.set_all({"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 1e-5})
-    runs, next_one = [one_run(24.0, at, 0.0) for at in (25.0, 27.0, 30.0)], one_run(21.5, 21.5, 0.0)
+    runs, next_one = [one_run(at, at, 0.0) for at in (25.0, 27.0, 30.0)], one_run(21.5, 21.5, 0.0)
 
     def told(*rooms: float) -> float:
         return room.Rooms.of(runs, rooms, tells_nothing).told(next_one, tells_nothing)[0]
@@ -303,7 +303,7 @@ def test_a_fit_looks_for_a_room_where_its_run_began_or_where_others_were() -> No
     bounds = room.believed(runs)
     assert bounds[:2] == [pytest.approx((at - 2.0, at + 2.0), abs=0.01) for at in (18.0, 24.0)]
     assert bounds[2] == pytest.approx((12.0, 30.0), abs=0.01)
-    assert room.believed(runs[:1]) == [(-math.inf, math.inf)]
+    assert room.believed(runs[:1]) == [(-math.inf, pytest.approx(18.0 + room.TOGETHER_K, abs=0.01))]
 
 
 def test_a_room_that_was_beside_its_log_is_so_in_another_run() -> None:

@@ -5,12 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ninespring.errors import InputError
+from ninespring.infer.declared import base_spec
 from ninespring.infer.predict import plant_of
+from ninespring.infer.problem import Problem
+from ninespring.infer.scene import scene_of
+from ninespring.io.logs.run import Run
 from ninespring.model import native
+from ninespring.model.effects import alloy
 from ninespring.model.models import SCHEMA, Array, Model, model_text, read_array, read_model
 
 HEAD = f'schema = "{SCHEMA}"\neffects = ["latent_heat"]\n\n[array]\nrows = 1\ncols = 2\n\n'
@@ -157,3 +163,49 @@ def test_a_model_is_the_plant_that_it_describes() -> None:
     # four times the section: four times the heat capacity, a quarter of the resistance
     assert plant.get("heat_capacity_j_per_k") == pytest.approx(4 * 0.300, rel=0.01)
     assert plant.get("resistance_martensite_ohm") == pytest.approx(0.175 / 4, rel=0.01)
+
+
+def test_what_is_inconsistent_is_named_with_its_values() -> None:
+    model = Model(Array(1, 1))
+    model.effects = ["latent_heat"]
+    model.parameters = {"martensite_start_c": 50.47938, "austenite_finish_c": 50.47938, "austenite_start_c": 44.0}
+    model.parameters["martensite_finish_c"] = 40.0
+    with pytest.raises(native.NativeError) as caught:
+        plant_of(model).start_from_measured(np.array([20.0]))
+    assert "martensite_start_c must be below austenite_finish_c: 50.47938, 50.47938" in str(caught.value)
+
+
+@pytest.mark.parametrize("middle_c", [50.479376, 80.0, 119.99999])
+@pytest.mark.parametrize(
+    ("low", "high"), [("martensite_start_c", "austenite_finish_c"), ("martensite_finish_c", "austenite_start_c")]
+)
+def test_an_alloy_that_a_fit_may_have_is_read_back_open(tmp_path: Path, middle_c: float, low: str, high: str) -> None:
+    points = dict.fromkeys(("martensite_finish_c", "austenite_start_c"), middle_c - 10.0)
+    points |= dict.fromkeys(("martensite_start_c", "austenite_finish_c"), middle_c + 10.0)
+    points |= {"martensite_finish_c": middle_c - 20.0, "austenite_finish_c": middle_c + 20.0}
+    assert not alloy.shut(points)
+    assert not alloy.shut({low: 1.0}), "what is not fitted is as it was declared"
+    assert alloy.shut(points | {high: points[low] + 0.9 * alloy.OPEN_K})
+    model = Model(Array(1, 1))
+    model.effects, model.parameters = ["latent_heat"], points | {high: points[low] + 1.01 * alloy.OPEN_K}
+    path = tmp_path / "model.toml"
+    path.write_text(model_text(model))
+    assert plant_of(read_model(path)).check() is None
+
+
+def test_a_fit_does_not_come_to_an_alloy_that_is_shut() -> None:
+    problem = pulse_problem()
+    spec = base_spec(problem).with_effect("latent_heat", alloy.numbers(scene_of(problem)), (), "")
+    start = {free.key: free.start for free in spec.free}
+    gap = problem.base_value("austenite_finish_c") - problem.base_value("martensite_start_c")
+    for open_k, shown in ((2.0 * alloy.OPEN_K, True), (0.5 * alloy.OPEN_K, False)):
+        values = start | {alloy.HYSTERESIS: open_k - gap}
+        left = problem.simulate(spec, [values[free.key] for free in spec.free], 0)
+        assert bool(np.abs(left).max() < 200.0) is shown
+
+
+def pulse_problem() -> Problem:
+    time_s = np.arange(60.0)
+    shown = 20.0 + np.random.default_rng(1).normal(0.0, 0.1, (60, 1))
+    run = Run("run", "", time_s, "power", np.zeros((60, 1)), shown, np.zeros(60), np.full(60, 20.0))
+    return Problem(Array(1, 1), [run])

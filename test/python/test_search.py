@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from command import ended
 from made import searched
+from ninespring.errors import InputError
 from ninespring.find import diagnosis, evidence, experiments, residual, search
 from ninespring.find.plan import plan_experiment
 from ninespring.infer import budget, room
@@ -29,13 +30,16 @@ from ninespring.model.spec import Spec
 from plants import a_plant, columns_of, levels
 
 
-def commanded(path: Path, on: dict[str, dict[str, float]], seed: int = 0) -> Path:
+def commanded(path: Path, on: dict[str, dict[str, float]], seed: int = 0, all_or_none: bool = False) -> Path:
     """Write a 1 x 2 log of 600 s at 1 Hz where only the command is known, as two heaters on an Arduino give it."""
     rng = np.random.default_rng(seed)
     time_s = np.arange(600.0)
     drive = levels(rng)
+    if all_or_none:
+        drive = np.where(drive > 0.0, 1.0, 0.0)
     numbers = {"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.012, "orthogonal_w_per_k": 0.004}
-    plant = a_plant((1, 2), on, numbers | {"command_power_w[1]": 0.8, "command_power_w[2]": 0.4})
+    second_w = 0.8 if all_or_none else 0.4
+    plant = a_plant((1, 2), on, numbers | {"command_power_w[1]": 0.8, "command_power_w[2]": second_w})
     shown = plant.simulate(time_s, native.COMMAND, drive) + rng.normal(0.0, 0.05, (600, 2))
     path.write_text(log_text(time_s, columns_of(u=drive, t=shown) | {"ambient_c": np.full(600, 20.0)}))
     return path
@@ -308,6 +312,24 @@ def test_the_way_the_supply_sags_is_told_from_the_other(tmp_path: Path, chopped:
     assert np.sqrt(np.nanmean((run.temperature_c - shown) ** 2)) < 0.06
 
 
+@pytest.mark.parametrize("chopped", [1.0, 0.0])
+def test_of_commands_that_are_all_or_none_the_way_the_supply_sags_is_not_told(tmp_path: Path, chopped: float) -> None:
+    """That it sags is certain all the same; the other law is a rival, with commands in between to tell it by."""
+    sag = {"supply_sag": {"supply_resistance_ohm": 8.0, "supply_chopped": chopped}}
+    run = read_log(commanded(tmp_path / "log.csv", sag, all_or_none=True), 2)
+    found = diagnosis.diagnose(Array(1, 2), [run], model=heaters())
+    (one,) = found.told.effects
+    assert one.name == "supply_sag" and one.certainty == "certain"
+    assert one.text.count("The supply sags under load") == 2 and one.text.endswith("do not tell which.")
+    (rival,) = found.told.rivals
+    assert rival.name == "supply_sag" and {rival.variant, one.variant} == {
+        "chopped loads",
+        "loads that draw their mean",
+    }
+    assert rival.experiment is not None and rival.experiment.difference_c > 1.0
+    assert any(0 < share < 100 for step in rival.experiment.steps for share in step.percent)
+
+
 def names_of(problem: Problem) -> set[str]:
     return {c.effect for c in effects.candidates(scene_of(problem))}
 
@@ -346,9 +368,19 @@ def test_only_what_the_log_could_show_is_a_candidate(make_log, tmp_path: Path) -
     both = read_log(commanded(tmp_path / "u.csv", {}), 2)
     pair = names_of(Problem(Array(1, 2), [both]))
     assert {"supply_sag", "holder_mass"} <= pair and "edge_loss" not in pair
-    one = replace(both, drive=both.drive[:, :1], temperature_c=both.temperature_c[:, :1])
+    one = replace(both, drive=both.drive[:, :1], temperature_c=both.temperature_c[:, :1], rounding_c=None)
     alone = names_of(Problem(Array(1, 1), [one]))
     assert "plate_conduction" in alone and "holder_mass" not in alone, "of a spring alone both are the same"
+    with pytest.raises(InputError, match="what a spring alone is mounted on is plate_conduction"):
+        diagnosis.fit_effects(Array(1, 1), [one], ["holder_mass"])
+    plates = [
+        next(c for c in effects.candidates(scene_of(Problem(array, [run]))) if c.effect == "plate_conduction")
+        for array, run in ((Array(1, 1), one), (Array(1, 2), both))
+    ]
+    numbers = {"plate_coupling_w_per_k": results.Number(value=0.002, stderr=0.0001, unit="W/K")}
+    said = [effects.sentence(one.effect, numbers, one.variant) for one in plates]
+    assert said[0].startswith("Behind the spring") and said[1].startswith("The springs share a plate")
+    assert "common" not in effects.in_words(plates[0].effect, plates[0].variant)
 
 
 def test_every_probe_is_within_its_bounds_and_moves_what_is_seen(make_log, tmp_path: Path) -> None:

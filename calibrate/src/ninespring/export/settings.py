@@ -106,7 +106,10 @@ def left_out(model: Model) -> dict[str, str]:
     table = native.parameter_table()
     out = {}
     for effect in model.effects:
-        of_it = [reason for name, reason in why.items() if table[name.partition("[")[0]].effect == effect]
+        # what array.toml declares of it is no part of what was found
+        of_it = [
+            why[name] for name in model.parameters if name in why and table[name.partition("[")[0]].effect == effect
+        ]
         if effect in effects.WHY_NOT_ON_CHIP:
             out[effect] = effects.WHY_NOT_ON_CHIP[effect]
         elif of_it and all(of_it):

@@ -153,7 +153,7 @@ def library(problem: Problem, fit: Fit) -> list[Cause]:
         power, by_key = power_of(problem, fit, r), fit.as_dict()
         plant = problem.plant_for(fit.spec, fit.values, r)
         ambient = problem.ambient_of(r, by_key)
-        shown = simulate_run(plant, run, ambient)
+        shown = simulate_run(plant, problem.begun(r, by_key), ambient)
         around = np.full(len(run.time_s), plant.get("ambient_c")) if ambient is None else ambient
         rise = shown - around[:, None]
         # where something unknown acts, the readings know better than the fit how warm the springs are

@@ -209,6 +209,8 @@ def rivals_of(
     seen = set()
     for instead, other in sorted(contenders, key=lambda one: one[1].chi2):
         extra = [e for e in other.spec.effects if e not in final.spec.effects]
+        if not extra and _another_law(final, other, instead):
+            extra = [instead]
         if instead not in adopted or not extra or (instead, extra[0]) in seen:
             continue
         apart = difference(problem, final, other)
@@ -236,6 +238,12 @@ def rivals_of(
     return rivals
 
 
+def _another_law(one: Fit, other: Fit, effect: str) -> bool:
+    """Return whether two fits have an effect with the same numbers by two laws."""
+    keys = [{free.key for free in fit.spec.free if free.effect == effect} for fit in (one, other)]
+    return keys[0] == keys[1] != set() and variant_of(one, effect) != variant_of(other, effect)
+
+
 def share_with(listed: Sequence[results.Effect], rivals: Sequence[results.Rival], same_c: float) -> None:
     """Share what speaks for a named effect with rivals that show the same readings: only the two in combination are fixed.
 
@@ -250,9 +258,11 @@ def share_with(listed: Sequence[results.Effect], rivals: Sequence[results.Rival]
         if not alike:
             continue
         instead = [effects.sentence(one.name, one.parameters, one.variant or "") for one in alike]
-        entry.probability /= 1 + len(alike)
-        entry.certainty = "probable"
-        entry.text += f" Or: {' Or: '.join(instead)} These readings fix them only in combination."
+        if others := sum(one.name != entry.name for one in alike):  # by another law it is the same name
+            entry.probability /= 1 + others
+            entry.certainty = "probable"
+        untold = "fix them only in combination" if others else "do not tell which"
+        entry.text += f" Or: {' Or: '.join(instead)} These readings {untold}."
 
 
 def candidates_of(found: search.Search, final: Fit, base: Fit) -> list[results.Candidate]:
@@ -640,12 +650,21 @@ def _errors(case: _Case, before: Fit) -> tuple[results.Baseline, results.After]:
     return baseline, after
 
 
+def _at_an_end(fit: Fit, effect: str) -> bool:
+    """Return whether a number of an effect lies at its bound, beyond which would be no such effect; or a room, for which anything may
+    make up."""
+    return any(
+        free.effect == effect or free.key.startswith("ambient_c@")
+        for free in fit.spec.free
+        if free.key in fit.at_bounds()
+    )
+
+
 def _listed(
     case: _Case, steps: Sequence[tuple[str, Fit]], strength: Mapping[str, float]
 ) -> tuple[list[results.Effect], list[results.RunsDiffer]]:
     """Return the effects of the array, the one that explains most first, and what is a run's own."""
     problem, final = case.problem, case.final
-    bounds = set(final.at_bounds())
     listed, differ = [], []
     for effect, growing in steps:
         sure = case.witnesses[effect]
@@ -653,8 +672,7 @@ def _listed(
             differ.append(runs_apart.entry(problem, final, effect, strength[effect], sure))
             continue
         probability = max(NAMED, sure.probability())  # where less, what was not seen tells of it
-        if bounds & {free.key for free in final.spec.free if free.effect == effect}:
-            # what would be beyond it is no such effect
+        if _at_an_end(final, effect):
             probability = min(probability, PROBABLE)
         parameters, variant = parameters_of(problem, final, effect), variant_of(final, effect)
         listed.append(
@@ -681,12 +699,16 @@ def _left(case: _Case, left_over: bool) -> results.Residual:
     problem, final = case.problem, case.final
     rho = statistics.autocorrelation([r / n for r, n in zip(final.residual, problem.noise, strict=True)], 1)
     depends, note = depends_on(problem, final)
+    structure_c = math.sqrt(excess(problem, final)) * problem.noise_c
     if left_over:
-        note = ("structure well above the noise remains that no effect of the library explains. " + note).strip()
+        note = (
+            f"structure of {structure_c:.2g} K rms remains, beside noise of {problem.noise_c:.2g} K, that no effect of the library "
+            f"explains. {note}"
+        ).strip()
     noise = np.sqrt(np.nanmean(np.square(np.asarray(problem.noise)), axis=0))
     return results.Residual(
         autocorrelation_lag1=float(np.clip(rho[1], -1.0, 1.0)),
-        structure_c=math.sqrt(excess(problem, final)) * problem.noise_c,
+        structure_c=structure_c,
         rmse_per_spring_c=[finite(v) for v in doubt.per_spring(final.residual)],
         noise_per_spring_c=[finite(v) for v in noise],
         depends_on=depends,
@@ -722,7 +744,7 @@ def _warned(
             if one.share > MOST_OF_IT and effect in effects.IN_WORDS
         ]
     doubts = doubt.of_log(problem, problem.runs, case.swapped, (base,) if final is base else (base, final), left_over)
-    return warnings + doubts + [*impossible, *doubt.about_power(problem), *plausibility.coarse(runs)], doubts
+    return warnings + doubts + [*impossible, *doubt.not_logged(problem, final), *plausibility.coarse(runs)], doubts
 
 
 def _counts(one: unnamed.Hidden) -> bool:
@@ -863,4 +885,6 @@ def _cannot_show(effect: str, runs: Sequence[Run]) -> InputError:
     seen = "nothing in it depends on it"
     if effect in resistance.OF_THE_WIRE:
         seen = "no temperature depends on it, and v / i tells it of springs that stay in each phase for half a minute"
+    if effect == "holder_mass" and runs[0].springs == 1:
+        seen = "what a spring alone is mounted on is plate_conduction, which the chip has"
     return InputError(f"{effect} cannot show here{more}: {seen}", runs[0].name)

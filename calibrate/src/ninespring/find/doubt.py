@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -83,6 +84,21 @@ def about_power(problem: Problem) -> list[str]:
     return [f"{scale[0]}: what is in W, J or ohm is {scale[1]}, and is not exported"]
 
 
+def of_rooms(problem: Problem, fit: Fit) -> list[str]:
+    """Return a warning for each run whose room would be further than its beginning, or its coldest thermometer, lets it be."""
+    return [
+        f"{Path(problem.runs[free.run].name).name}: no ambient_c, and its room comes to lie at a bound, {fit.value(free.key):.1f} degC: "
+        "what the model lacks, or how the run began, would have it beyond; log ambient_c"
+        for free in fit.spec.free
+        if free.run is not None and free.key.startswith("ambient_c@") and free.key in fit.at_bounds()
+    ]
+
+
+def not_logged(problem: Problem, fit: Fit) -> list[str]:
+    """Return what is to be said of a fit because something was not logged."""
+    return of_rooms(problem, fit) + about_power(problem)
+
+
 def _of_springs(problem: Problem, fit: Fit) -> dict[str, str]:
     """Return numbers of single springs beside which too much is left unexplained to know them, and that in words."""
     out = {}
@@ -135,4 +151,4 @@ def model_of_fit(
     model = model_of(problem, fit, as_shown(problem, fit))
     resistance.into_model(model, second)
     into_model(model, problem, fit, doubts)
-    return model, doubts + about_power(problem)
+    return model, doubts + not_logged(problem, fit)

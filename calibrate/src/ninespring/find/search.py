@@ -393,6 +393,26 @@ class Search:
                 out.append((effect, self.refit(other, [screen.candidates[k]], [sizes.get(k, 1.0)])))
         return out
 
+    def other_laws(self, fit: Fit, without: dict[str, Fit]) -> list[tuple[str, Fit]]:
+        """Return models in which one of `fit`'s effects follows another law that may explain as much, however long was searched."""
+        out = []
+        for effect, other in without.items():
+            own = self.candidate_of(fit, effect)
+            if own is None or not own.law:
+                continue
+            screen = self.screen(other)
+            # a law that bends explains more than a line along it: lines are compared
+            line = screen.forecast([screen.candidates.index(own)])[0]
+            for k, one in enumerate(screen.candidates):
+                if one.effect != effect or one is own or screen.forecast([k])[0] < 0.5 * line:
+                    continue
+                spec = one.added_to(other.spec)
+                if (key := self.key(spec)) not in self.fits:
+                    self.progress(f"{effect}: {one.variant}?")
+                    self.fits[key] = self.problem.fit(spec, fit.as_dict(), tolerance=1e-3, max_steps=STEPS)
+                out.append((effect, self.fits[key]))
+        return out
+
     def settle(
         self, fit: Fit, share: float = MIN_SHARE, grow: bool = True
     ) -> tuple[Fit, dict[str, Fit], list[tuple[str, Fit]]]:
@@ -405,7 +425,7 @@ class Search:
             fit, without = self.backward(fit, share)
             if before is not None and set(fit.spec.effects) < set(before[0].spec.effects):
                 return before  # what took a place did not stay: it is no better there
-            contenders = self.rivals(fit, without)
+            contenders = [*self.rivals(fit, without), *self.other_laws(fit, without)]
             better = [(other.chi2, k) for k, (_, other) in enumerate(contenders) if self.preferred(other, fit)]
             if turn == 3 or not better:
                 break

@@ -152,6 +152,8 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, n
     known = {key: start[key] for key in (*fitted.stuck, *_hardly_shown(fit, fitted, kept)) if key in start}
     fitted.values = np.array([known.get(f.key, value) for f, value in zip(spec.free, fitted.values, strict=True)])
     run, values = split.left_out, fitted.as_dict()
+    if (share := room.around_share(values)) is not None:
+        run = replace(run, around_share=share)
     if split.alone:
         off = (run.temperature_c - problem.simulate(spec, fitted.values, 0))[split.counts]
         return off, off
@@ -175,7 +177,7 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, n
 def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> tuple[float, float]:
     """Return how warm the room of a run was and one sigma of it, as `predict` tells it by the runs that were fitted."""
     rooms = {r: values[f"ambient_c@{r + 1}"] for r in range(len(problem.runs)) if f"ambient_c@{r + 1}" in values}
-    return room.Rooms.of([problem.runs[r] for r in rooms], list(rooms.values()), plant).told(run, plant)
+    return room.Rooms.of([problem.begun(r, values) for r in rooms], list(rooms.values()), plant).told(run, plant)
 
 
 @dataclass

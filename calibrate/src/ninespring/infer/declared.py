@@ -53,7 +53,7 @@ def base_spec(problem: Problem, frozen: bool = False) -> Spec:
     for r, (run, (low, high)) in enumerate(zip(runs, room.believed(runs), strict=True)):
         if run.ambient_c is None:
             begun = _first_guess(run) if alone is None else alone
-            guess = 0.5 * (low + high) if math.isfinite(high) else begun
+            guess = 0.5 * (low + high) if math.isfinite(low) else begun
             start, low, high = (float(np.clip(one, -35.0, 75.0)) for one in (guess, low, high))
             free.append(Free(f"ambient_c@{r + 1}", start, low, high, "degC", run=r, prior=prior))
     return Spec((), tuple(fixed.items()), tuple(free), ())

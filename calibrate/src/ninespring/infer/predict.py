@@ -48,6 +48,8 @@ def in_its_room(model: Model, run: Run) -> Run:
     """Return a run without an ambient with the one that its first minute tells, one whose room is not where it was logged
     with where it is, and say so; others as they are."""
     known = model.provenance
+    if (share := known.get("around_share", run.around_share)) != run.around_share:
+        run = replace(run, around_share=share)
     if run.ambient_c is not None:
         over_k = known.get("room_over_logged_k", 0.0)
         if run.room_told or not over_k:

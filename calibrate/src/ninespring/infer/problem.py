@@ -21,9 +21,10 @@ from scipy.optimize import lsq_linear
 from ..io import statistics
 from ..io.logs.run import Run
 from ..model import native
+from ..model.effects import alloy
 from ..model.models import Array
 from ..model.simulate import array_parameters, fades_per_s, hidden_k, simulate_run
-from ..model.spec import AMBIENT_OFFSET, DRIVE_GAIN, RUN_DRIVE, SENSOR_OFFSET, Spec, Values
+from ..model.spec import AMBIENT_OFFSET, AROUND_SHARE, DRIVE_GAIN, RUN_DRIVE, SENSOR_OFFSET, Spec, Values
 from .budget import Budget
 from .descent import Descent, Shown
 from .fit import Fit
@@ -191,23 +192,34 @@ class Problem:
         return ambient
 
     def plant_for(self, spec: Spec, values: Values, run_index: int | None = None) -> native.Plant:
-        """Return a fresh plant with the spec's effects and values, commands as strong as in a run where one is given."""
+        """Return a fresh plant with the spec's effects and values, commands as strong as in a run where one is given.
+
+        An alloy that is shut is refused as the plant would refuse it.
+        """
+        settings = spec.settings(values, self._base.get)
+        if alloy.shut(settings):
+            raise native.NativeError(native.OUTSIDE, "the alloy's loop")
         plant = self._base.copy()
         plant.set_effects(spec.plant_effects)
         plant.set_all(dict(spec.fixed))
-        plant.set_all(spec.settings(values, self._base.get))
+        plant.set_all(settings)
         if run_index is not None and self.runs[run_index].mode == "command" and RUN_DRIVE in spec.effects:
             gain = dict(zip((f.key for f in spec.free), values, strict=True))[f"{DRIVE_GAIN}@{run_index + 1}"]
             for k in range(self.runs[run_index].springs):
                 plant.set(f"command_power_w[{k + 1}]", gain * plant.get(f"command_power_w[{k + 1}]"))
         return plant
 
+    def begun(self, run_index: int, values: Mapping[str, float]) -> Run:
+        """Return a run as it was read, with what was around its springs as warm as these numbers have it."""
+        run, share = self.runs[run_index], values.get(f"{AROUND_SHARE}@{run_index + 1}")
+        return run if share is None else replace(run, around_share=share)
+
     def run_of(self, run_index: int, values: Mapping[str, float]) -> Run:
         """Return a run with what is its own put right: driven as strongly as it was, read as if nothing were off.
 
         A command's strength is the plant's (`plant_for`).
         """
-        run = self.runs[run_index]
+        run = self.begun(run_index, values)
         gain = values.get(f"{DRIVE_GAIN}@{run_index + 1}", 1.0)
         off_k = values.get(f"{SENSOR_OFFSET}@{run_index + 1}", 0.0)
         if gain != 1.0 and run.mode != "command":

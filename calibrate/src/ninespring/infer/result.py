@@ -93,8 +93,12 @@ def model_of(
     if (over_k := room.over_logged_k(fit.as_dict(), errors)) is not None:
         model.provenance["room_over_logged_k"] = over_k
         model.provenance["room_over_logged_s"] = max(run.duration_s for run in problem.runs)
+    if (share := room.around_share(fit.as_dict())) is not None:
+        model.provenance["around_share"] = share
     if rooms:
-        told = room.Rooms.of([problem.runs[r] for r in rooms], constants, problem.plant_for(fit.spec, fit.values))
+        told = room.Rooms.of(
+            [problem.begun(r, fit.as_dict()) for r in rooms], constants, problem.plant_for(fit.spec, fit.values)
+        )
         model.provenance["room_spread_k"] = told.spread_k
         model.provenance["room_first_minute_misses_k"] = told.misses_k
         if told.over:

@@ -8,6 +8,7 @@ model lacks.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,8 +18,10 @@ import numpy as np
 from ..io import statistics
 from ..io.logs.run import Run
 from ..model import native
+from ..model.effects.ambient_drift import MOST_K_PER_H
+from ..model.simulate import WARM_K as BEGINS_WARM_K
 from ..model.simulate import fades_per_s, hidden_k, simulate_run
-from ..model.spec import AMBIENT_OFFSET, SENSOR_OFFSET
+from ..model.spec import AMBIENT_OFFSET, AROUND_SHARE, SENSOR_OFFSET
 
 FIRST_S = 60.0
 """Of a run, what it is told by."""
@@ -47,6 +50,8 @@ TOGETHER_K = 3.0
 """Thermometers at rest in one room differ by less ..."""
 HOTTEST_C = 35.0
 """... and show less: nobody works in a hotter room, whatever all runs begin at."""
+SURELY = 3.0
+"""Of their errors, by how many a thermometer must move before its spring does."""
 
 
 @dataclass(frozen=True)
@@ -74,29 +79,92 @@ def first_c(run: Run) -> float:
     return _begins_at(run)[0]
 
 
-def _begins_at(run: Run) -> tuple[float, float]:
-    """Return that, and how far the warmest is above it, K."""
+def _before_driven(run: Run) -> slice:
+    """Return the rows of a run's first minute before anything is driven, or at least its first with a reading."""
     driven = np.flatnonzero((run.drive != 0.0).any(axis=1))
     rests_s = min(FIRST_S, run.time_s[driven[0]] - run.time_s[0] if driven.size else FIRST_S)
     read = np.flatnonzero(np.isfinite(run.temperature_c).any(axis=1))
     # what is driven from a row on has not warmed what that row shows
     end = int(np.searchsorted(run.time_s - run.time_s[0], rests_s, side="right"))
-    first = run.temperature_c[: max(end, 1 + read[0] if read.size else 1)]
+    return slice(max(end, 1 + read[0] if read.size else 1))
+
+
+def _begins_at(run: Run) -> tuple[float, float]:
+    """Return what a run's coldest spring shows then, degC, and how far the warmest is above it, K."""
+    first = run.temperature_c[_before_driven(run)]
     # a mean: where thermometers step, it is finer than any of them; without what is nonsense
     middle = [statistics.trimmed_mean(one[np.isfinite(one)], 0.1) for one in first.T if np.isfinite(one).any()]
     return (float(min(middle)), float(max(middle) - min(middle))) if middle else (math.nan, math.nan)
 
 
+def moves(run: Run) -> bool:
+    """Return whether a run's springs are on their way to their room as it begins.
+
+    What nothing drives rests at its room alone: springs that move by more than their thermometers' errors, and faster than rooms do, are
+    warmer than it if they fall, and colder if they rise. So are those that fall later, driven or not, by more than rooms do until then:
+    nothing cools them below it. Half of the thermometers must say so, as one may be off.
+    """
+    since_s, there = run.time_s - run.time_s[0], np.isfinite(run.temperature_c)
+    noise = np.fmax(statistics.noise_floor(run.temperature_c, run.starts), statistics.rounding(run.temperature_c))
+    end = _before_driven(run).stop
+    rates, errors, falls_k = [], [], []
+    for k in np.flatnonzero(there.any(axis=0)):
+        shown_c, time_s = run.temperature_c[there[:, k], k], since_s[there[:, k]]
+        rows = max(1, int(there[:end, k].sum()))
+        low_c, at_s = _coldest(time_s, shown_c)
+        falls_k.append(float(np.mean(shown_c[:rows])) - low_c - 2.0 * MOVES_K - at_s * MOST_K_PER_H / 3600.0)
+        about_s = time_s[:rows] - time_s[:rows].mean()
+        if rows > 2 and (square := float(about_s @ about_s)) > 0.0:
+            rates.append(float(about_s @ shown_c[:rows]) / square)
+            errors.append(float(noise[k]) * math.sqrt(FEWER / square))
+    if falls_k and np.median(falls_k) > 0.0:
+        return True
+    most = SURELY * float(np.median(errors)) / math.sqrt(len(rates)) + MOST_K_PER_H / 3600.0 if rates else math.inf
+    return bool(rates) and abs(float(np.median(rates))) > most
+
+
+def _coldest(time_s: np.ndarray, shown_c: np.ndarray) -> tuple[float, float]:
+    """Return the lowest mean of any FIRST_S of what a thermometer shows, degC, and when that was, s; without what is nonsense."""
+    edges = np.searchsorted(time_s, np.arange(time_s[0], time_s[-1] + FIRST_S, FIRST_S))
+    parts = [(begin, end) for begin, end in itertools.pairwise(edges) if end > begin]
+    means = [statistics.trimmed_mean(shown_c[begin:end], 0.1) for begin, end in parts]
+    least = int(np.argmin(means))
+    return float(means[least]), float(np.mean(time_s[slice(*parts[least])]))
+
+
+def coldest_c(run: Run) -> float:
+    """Return the lowest that any thermometer of a run falls to, degC: its room is no warmer, heat only warms."""
+    there = np.isfinite(run.temperature_c)
+    return min(
+        (
+            _coldest(run.time_s[one], shown[one])[0]
+            for one, shown in zip(there.T, run.temperature_c.T, strict=True)
+            if one.any()
+        ),
+        default=math.inf,
+    )
+
+
+def begins_warm(run: Run) -> bool:
+    """Return whether a run begins with a spring that was heated before, by its room, or by the coldest that its thermometers fall to."""
+    room_c = coldest_c(run) if run.ambient_c is None else float(run.ambient_c[0])
+    return not run.warm and bool(np.nanmax(run.temperature_c[0], initial=room_c) > room_c + BEGINS_WARM_K)
+
+
 def rested(runs: Sequence[Run]) -> list[bool]:
-    """Return which runs began at their room: thermometers together, no hotter than rooms are nor than they differ from the coldest such start.
+    """Return which runs began at their room: thermometers together and still, no hotter than rooms are nor than they differ from the
+    coldest such start.
 
     One such run alone may have begun as no other does: it did not where the others began warmer, and not together. A thermometer alone
-    is together with itself however it was warmed: rooms of two days tell, not all that rooms can be.
+    is together with itself however it was warmed, and so are all of an array that is seen to have been warmed: rooms of two days tell, not
+    all that rooms can be.
     """
-    begins = [(math.nan, math.inf) if run.warm else _begins_at(run) for run in runs]
-    together = [first for first, apart in begins if apart <= TOGETHER_K]
-    apart_k = (4.0 if runs[0].springs > 1 else 2.0) * ROOMS_K
-    most = min(HOTTEST_C, min(together, default=HOTTEST_C) + apart_k)
+    still = [not run.warm and not moves(run) for run in runs]
+    begins = [_begins_at(run) if one else (math.nan, math.inf) for run, one in zip(runs, still, strict=True)]
+    cold = [first for first, apart in begins if apart <= TOGETHER_K]
+    warmed = [coldest_c(run) for run, one in zip(runs, still, strict=True) if not one and not run.warm]
+    apart_k = (4.0 if runs[0].springs > 1 and not warmed else 2.0) * ROOMS_K
+    most = min(HOTTEST_C, min(cold + warmed, default=HOTTEST_C) + apart_k)
     found = [apart <= TOGETHER_K and first <= most for first, apart in begins]
     coldest = min((first for first, _ in begins if math.isfinite(first)), default=math.nan)
     one_of_others = len(runs) > 1 and any(
@@ -111,7 +179,7 @@ def rests_alone(runs: Sequence[Run]) -> float | None:
     They may have been warmed all alike, which others would show: it is as likely as that a room is so far from another day's, to ROOMS_K,
     and no bound.
     """
-    if len(runs) != 1 or runs[0].warm:
+    if len(runs) != 1 or runs[0].warm or moves(runs[0]):
         return None
     first, apart = _begins_at(runs[0])
     return first if apart <= TOGETHER_K and first <= HOTTEST_C else None
@@ -122,7 +190,7 @@ def above_logged(run: Run) -> float | None:
 
     A spring that nothing has heated is as warm as what it loses heat to.
     """
-    if run.ambient_c is None or run.warm:
+    if run.ambient_c is None or run.warm or moves(run):
         return None
     first, apart = _begins_at(run)
     above = first - float(run.ambient_c[0])
@@ -132,15 +200,22 @@ def above_logged(run: Run) -> float | None:
 def believed(runs: Sequence[Run]) -> list[tuple[float, float]]:
     """Return between which temperatures, degC, a fit may look for each run's room; infinite where nothing is known of it.
 
-    A run that began warm was in a room as warm as those of the others were.
+    A run that began warm was in a room as warm as those of the others were, and no warmer than its coldest thermometer fell to, by
+    more than thermometers in one room differ.
     """
-    began = list(zip(map(first_c, runs), rested(runs), strict=True))
-    rooms = [first for first, cold in began if cold]
-    if not rooms:
-        return [(-math.inf, math.inf)] * len(runs)
-    usual, off = float(np.mean(rooms)), 3.0 * ROOMS_K
-    about = [(first, 2.0 * MOVES_K) if cold else (usual, off) for first, cold in began]
-    return [(middle - off, middle + off) for middle, off in about]
+    began = list(zip(runs, map(first_c, runs), rested(runs), strict=True))
+    rooms = [first for _, first, cold in began if cold]
+    usual, off = (float(np.mean(rooms)), 3.0 * ROOMS_K) if rooms else (0.0, math.inf)
+    about = [(first, 2.0 * MOVES_K, math.inf) if cold else (usual, off, coldest_c(run)) for run, first, cold in began]
+    return [
+        (middle - off, max(middle - off + MOVES_K, min(middle + off, most + TOGETHER_K))) for middle, off, most in about
+    ]
+
+
+def around_share(values: Mapping[str, float]) -> float | None:
+    """Return the mean share of warm springs' warmth that was around them as runs began, by a fit's numbers; None where it has none."""
+    each = [value for key, value in values.items() if key.partition("@")[0] == AROUND_SHARE]
+    return float(np.mean(each)) if each else None
 
 
 def over_first(runs: Sequence[Run], ambient_c: Sequence[float]) -> tuple[float, float] | None:
@@ -208,11 +283,12 @@ def guessed(run: Run, usual_c: float, over: tuple[float, float] | None, spread_k
     """Return what is believed of a run's room before it moves.
 
     Rooms of other days say one thing. What other runs began like says another, if this one began so, too: it may have begun warm,
-    and is then anywhere within WARM_K above its room. Where its thermometers are apart it did, but for the coldest, perhaps.
+    and is then anywhere within WARM_K above its room. Where its thermometers are apart it did, but for the coldest, perhaps; where they
+    move in its first minute it did.
     """
     warm = Guess(0.0, usual_c, spread_k)
     first, apart = _begins_at(run)
-    if over is None or not math.isfinite(first):
+    if over is None or not math.isfinite(first) or moves(begun(run) or run):
         return [warm]
     here = first + over[0]
     both = warm.with_told(here, over[1] ** 2)

@@ -36,4 +36,5 @@ def scene_of(problem: Problem) -> Scene:
         # of a kind that nobody has heard of anything may be
         any((problem.array.sensor.get("kind") or run.sensor) not in SENSORS[1:] for run in runs),
         problem.reads_ohm,
+        () if problem.reads_ohm else tuple(r for r, run in enumerate(runs) if room.begins_warm(run)),
     )

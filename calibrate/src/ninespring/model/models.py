@@ -22,6 +22,7 @@ SCHEMA = "ninespring.model/1"
 ROOMS = (
     "room_over_logged_k",
     "room_over_logged_s",
+    "around_share",
     "room_spread_k",
     "room_over_first_k",
     "room_over_first_sigma_k",
@@ -72,6 +73,7 @@ _PROVENANCE = Keys(
     {
         **{key: str for key in ("tool", "date", "note")},
         **{key: number(-100.0, 1e6) for key in ERRORS},
+        "around_share": number(0.0, 1.0),
         "doubts": [str],
         "logs": [Keys(must={"file": str, "sha256": str})],
     }

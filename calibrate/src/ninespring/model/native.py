@@ -23,9 +23,11 @@ BOARD_SPRINGS = 64
 POWER, CURRENT, DUTY, COMMAND, TEMPERATURE = range(5)
 MODES = {"power": POWER, "current": CURRENT, "command": COMMAND, "temperature": TEMPERATURE}
 
+OUTSIDE = -2
+"""Status of a value, or of several together, that is none."""
 _ERRORS = {
     -1: "no parameter or effect of that name",
-    -2: "value outside its limits",
+    OUTSIDE: "value outside its limits",
     -3: "no such spring",
     -4: "rows x columns x layers not in 1..1024",
     -5: "out of memory",
@@ -225,7 +227,8 @@ class Plant:
 
     def _check(self, status: int, what: str) -> None:
         if status:
-            raise NativeError(status, what)
+            why = self.check() if status == OUTSIDE else None
+            raise NativeError(status, f"{what} ({why})" if why else what)
 
     def set(self, name: str, value: float) -> None:
         """Set a parameter, `name` or `name[k]`."""
@@ -254,10 +257,13 @@ class Plant:
             raise NativeError(-1, sorted(wanted)[0])
 
     def check(self) -> str | None:
-        """Return what is inconsistent among the parameters, None if nothing is."""
+        """Return what is inconsistent among the parameters and what they are, None if nothing is."""
         message = ctypes.c_char_p()
-        status = self._lib.plant_check(self._plant, ctypes.byref(message))
-        return None if status == 0 else (message.value or b"inconsistent").decode()
+        if self._lib.plant_check(self._plant, ctypes.byref(message)) == 0:
+            return None
+        why = (message.value or b"inconsistent").decode()
+        named = ", ".join(f"{self.get(word):.7g}" for word in why.split() if word in parameter_table())
+        return f"{why}: {named}" if named else why
 
     def reset(self) -> None:
         """Everything to ambient, martensite, time 0."""

@@ -9,6 +9,7 @@ import numpy as np
 from ..io.logs.run import Run
 from . import native, tables
 from .models import Array
+from .spec import AROUND
 
 EACH = (
     "heat_capacity_j_per_k",
@@ -22,10 +23,9 @@ EACH = (
 HIDES_S = 20.0
 """Of what a spring does, thermometers show this much later at most, about."""
 
-AROUND = "shared_air", "plate_conduction", "holder_mass"
-"""Effects that keep heat around the springs."""
 WARM_K = 3.0
-"""A spring that begins so much above its room was driven before: air, plate and holders are warm, too, as if it had been so warm for long."""
+"""A spring that begins so much above its room was driven before: air, plate and holders are warm, too, as if it had been so warm for long,
+or by a share of that which the run tells."""
 HOTTEST_C = 300.0
 """Above which nothing transforms any more, and no spring is held."""
 
@@ -39,8 +39,8 @@ def started(
 ) -> native.Plant:
     """Return the plant as it is where a log, or what follows a gap in it, begins.
 
-    Air, plate and holders are in balance with springs that begin warm, or with the first inputs where a run begins warm and steady: nobody
-    saw what was before, but at ambient they were not.
+    Air, plate and holders are in balance with springs that begin warm, or as much warmer than the room as a share of that makes them, or
+    with the first inputs where a run begins warm and steady: nobody saw what was before.
     """
     if ambient is not None:
         plant.set_ambient(float(ambient[begin]))
@@ -51,7 +51,9 @@ def started(
     if run.warm:
         _in_balance(plant, native.MODES[run.mode], run.drive[begin])
     elif begin == 0 and any(map(plant.has, AROUND)) and np.nanmax(first, initial=room_c) > room_c + WARM_K:
-        _in_balance(plant, native.TEMPERATURE, np.clip(first, -60.0, HOTTEST_C))
+        _in_balance(plant, native.TEMPERATURE, room_c + run.around_share * (np.clip(first, -60.0, HOTTEST_C) - room_c))
+        for k in range(run.springs):  # let go: what is held is where it is held
+            plant.drive(k, native.POWER, 0.0)
     _from_austenite(plant, run, begin, room_c)
     plant.start_from_measured(first + (0.0 if start_offset is None else start_offset))
     return plant

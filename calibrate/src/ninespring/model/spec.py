@@ -12,6 +12,10 @@ RUN_DRIVE, RUN_AMBIENT, RUN_SENSOR = RUNS_OWN = ("run_drive_gain", "run_ambient_
 """What may be a run's own (effects/runs_differ.py): of the measurement, unknown to the plant."""
 DRIVE_GAIN, AMBIENT_OFFSET, SENSOR_OFFSET = "drive_gain", "ambient_offset_k", "run_sensor_offset_k"
 """Their numbers, by run: `drive_gain@1`."""
+AROUND = "shared_air", "plate_conduction", "holder_mass"
+"""Effects that keep heat around the springs ..."""
+AROUND_SHARE = "around_share"
+"""... and as what part of the springs' own warmth they had as a run began warm, by run: `around_share@1`."""
 Values = Sequence[float] | np.ndarray
 """Values of a spec's free numbers, in their order and units."""
 

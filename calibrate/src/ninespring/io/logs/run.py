@@ -46,6 +46,8 @@ class Run:
     """Currents and voltages are a board's: its voltages step."""
     warm: bool = False
     """The run begins warm and steady: hidden heat is in balance with the first inputs."""
+    around_share: float = 1.0
+    """Where springs begin warm: what air, plate and holders have of that, 1: as much as beside springs that had long been so warm."""
     starts: list[int] = field(default_factory=lambda: [0])
     """Rows at which a simulation starts again from the measured temperatures (the first; after gaps)."""
     hotter: np.ndarray | None = None

@@ -12,7 +12,7 @@ import pkgutil
 
 from ...io.results import Parameters
 from .. import native, tables
-from . import runs_differ, spring_mismatch
+from . import plate_conduction, runs_differ, spring_mismatch
 from .effect import Candidate as Candidate
 from .effect import Effect as Effect
 from .effect import Scene as Scene
@@ -23,12 +23,16 @@ MEASUREMENT = frozenset(name for name, row in tables.effects().items() if row.ac
 WHY_NOT_ON_CHIP = {name: row.not_on_chip for name, row in tables.effects().items() if row.not_on_chip}
 ON_CHIP = frozenset(tables.effects()) - set(WHY_NOT_ON_CHIP)
 """What the table of effects (lib/parameters/effects.def) says of each: its sentence, where it acts, why not on the chip."""
+VARIANT_IN_WORDS = {
+    (spring_mismatch.NAME, spring_mismatch.EACH): spring_mismatch.EACH_IN_WORDS,
+    ("plate_conduction", plate_conduction.ALONE): plate_conduction.ALONE_IN_WORDS,
+}
+"""What that table has no sentence for."""
 
 
 def in_words(name: str, variant: str = "") -> str:
     """Return what an effect is, in words."""
-    each = name == spring_mismatch.NAME and variant == spring_mismatch.EACH
-    return spring_mismatch.EACH_IN_WORDS if each else IN_WORDS[name]
+    return VARIANT_IN_WORDS.get((name, variant), IN_WORDS[name])
 
 
 @functools.cache

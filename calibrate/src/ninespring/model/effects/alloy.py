@@ -22,6 +22,8 @@ USUAL_K = 20.0
 """Width of a band, by those samples."""
 CLOSED_K = 4.0
 """Between the middles of the bands of a narrow loop: an R-phase's, or of a wire that is loaded and trained."""
+OPEN_K = 1e-3
+"""By how much a loop is open at least: less does not survive the seven digits of model.toml, and the plant refuses one that is not."""
 STEP_K = 5.0
 """Places of the transformation that are tried: half its usual width apart."""
 
@@ -62,6 +64,12 @@ def places(scene: Scene) -> list[dict[str, float]]:
     bands = [STILL, wider | {HYSTERESIS: -0.5 * sum(wider.values())}] if any(wider.values()) else [STILL]
     shifts = [STEP_K * k for k in range(-most + 1, most)]
     return [{SHIFT: s} | one for one in bands for s in shifts if get("austenite_start_c") + s < scene.hottest_c]
+
+
+def shut(numbers: Mapping[str, float]) -> bool:
+    """Return whether these parameters of the plant, where they are an alloy's that is fitted, make a loop that is hardly open."""
+    pairs = ("martensite_start_c", "austenite_finish_c"), ("martensite_finish_c", "austenite_start_c")
+    return any(low in numbers and high in numbers and numbers[high] - numbers[low] < OPEN_K for low, high in pairs)
 
 
 def closed(place: Mapping[str, float], get: Callable[[str], float]) -> dict[str, float]:

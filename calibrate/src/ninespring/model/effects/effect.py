@@ -9,7 +9,7 @@ from typing import Any
 
 from ...io.results import Parameters
 from .. import native
-from ..spec import Free, Spec
+from ..spec import AROUND, AROUND_SHARE, Free, Spec
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,8 @@ class Candidate:
     """Follows anything slow: it must beat a physical cause clearly."""
     alternatives: bool = False
     """Its probes are places to start from, not directions to be combined: the best one counts."""
+    law: bool = False
+    """One of the laws that its effect's number may be of: what is on or off may not tell them apart, and all are fitted."""
     slow_node: bool = False
     """A slow cause that a flexible one hides: tried in its place whatever the forecast says."""
 
@@ -116,6 +118,8 @@ class Scene:
     """What shows the temperatures may see more than one spring at once."""
     reads_ohm: bool = False
     """The readings are the springs' own resistances."""
+    warm: tuple[int, ...] = ()
+    """Runs that begin with springs that were heated before: what is around them was heated for as long as nobody saw."""
 
     @property
     def springs(self) -> int:
@@ -158,9 +162,19 @@ class Effect:
         )
 
     def candidates_for(self, scene: Scene) -> list[Candidate]:
-        """Return the ways it could be there, its name filled in."""
+        """Return the ways it could be there, its name filled in; what keeps heat has how much of it each warm run began with, too."""
+        warm = scene.warm if self.name in AROUND else ()
+        begun = [
+            Free(f"{AROUND_SHARE}@{r + 1}", 1.0, 0.0, 1.0, "1", run=r, scale=0.5, prior=1.0, ends=True) for r in warm
+        ]
+        cold = ({free.key: 0.0 for free in begun},) if begun else ()
         return [
-            replace(one, effect=self.name, free=tuple(replace(f, effect=self.name) for f in one.free))
+            replace(
+                one,
+                effect=self.name,
+                free=tuple(replace(f, effect=self.name) for f in (*one.free, *begun)),
+                more_starts=(*one.more_starts, *cold),
+            )
             for one in self.candidates(scene)
         ]
 

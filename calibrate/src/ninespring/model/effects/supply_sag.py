@@ -13,7 +13,7 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
     size = 0.1 * scene.declared("supply_v") ** 2 / total
     for chopped, variant in enumerate(("loads that draw their mean", "chopped loads")):
         number, fixed = linear(name, 0.0, 100.0, size, size), (("supply_chopped", float(chopped)),)
-        yield one_number(number, size, variant, fixed=fixed, most=6.0, more_starts=({name: 0.3 * size},))
+        yield one_number(number, size, variant, fixed=fixed, most=6.0, law=True, more_starts=({name: 0.3 * size},))
 
 
 EFFECT = Effect(
