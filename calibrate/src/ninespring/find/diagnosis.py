@@ -32,6 +32,7 @@ from . import (
     doubt,
     experiments,
     lasting,
+    loose,
     plausibility,
     resistance,
     rested,
@@ -299,6 +300,8 @@ class _Case:
     found first."""
     carried: Fit | None = None
     """What is given in place of the final fit where that foretells worse: without what is of that day."""
+    loose: list[loose.Loose] = field(default_factory=list)
+    """Thermometers that were for a while, none of whose readings count then."""
 
     @property
     def adopted(self) -> list[str]:
@@ -363,7 +366,7 @@ def _diagnose(
         unexplained=bool(left_over),
         unknown_heat=heat.told(),
         runs_differ=differ,
-        unnamed=[one.told() for one in case.hidden if _counts(one)],
+        unnamed=[*(one.told() for one in case.loose), *(one.told() for one in case.hidden if _counts(one))],
         resistance=second.told if second else results.UNSET,
         residual=residual,
         candidates=tried[:40],
@@ -391,13 +394,34 @@ def _foretelling(
     least squares found first may foretell best: a model it may be, without naming anything.
     """
 
-    def prepared() -> Problem:
-        return prepare(model.array if model else array, runs, dict(model.parameters) if model else {})
+    left_out: list[loose.Loose] = []
+    """Thermometers that are loose for a while, none of whose readings count then: told by what is the same in all runs."""
+
+    def prepared(whole: bool = False) -> Problem:
+        logs = runs if whole else [loose.without(run, r, left_out) for r, run in enumerate(runs)]
+        return prepare(model.array if model else array, logs, dict(model.parameters) if model else {})
+
+    def begun(alike: bool, fits: Mapping[Any, Fit] | None = None) -> _Begun:
+        return _begun(prepared(), model, frozen, progress, alike, fits)
+
+    def searched(alike: bool) -> _Case:
+        first = begun(alike)
+        while len(left_out) < loose.MOST and (one := _loose(first)):
+            left_out.append(one)
+            first = begun(alike)  # what was found with such readings is found anew
+        case = _searched(first, alike)
+        if left_out:
+            whole, many = prepared(whole=True).runs, len(left_out)
+            left_out[:] = [own for one in left_out if (own := loose.seen_by(case.problem, whole, case.final, one))]
+            if len(left_out) < many:
+                # a model that never saw some of these readings has them right: they count
+                case = _searched(begun(alike), alike)
+        return case
 
     def account(alike: bool, fits: Mapping[Any, Fit] | None = None) -> _Account:
-        problem = prepared()
-        case = _searched(problem, model, frozen, progress, alike, fits)
-        judged_by = unseen.Unseen(problem, case.search, case.declared)
+        case = searched(alike) if fits is None else _searched(begun(alike, fits), alike)
+        case.loose = list(left_out)
+        judged_by = unseen.Unseen(case.problem, case.search, case.declared)
         return case, _judged(case, judged_by), judged_by
 
     if frozen:
@@ -435,7 +459,19 @@ def _rested(plain: _Case, prepared: Callable[[], Problem]) -> _Account | None:
     found, final, without = searched
     final = _finish(problem, final)
     case = _Case(
-        problem, plain.progress, found, first.base, found.base, final, without, [], plain.swapped, [], {}, None
+        problem,
+        plain.progress,
+        found,
+        first.base,
+        found.base,
+        final,
+        without,
+        [],
+        plain.swapped,
+        [],
+        {},
+        None,
+        plain.loose,
     )
     case.witnesses = {effect: witness(problem, final, effect, other, False) for effect, other in without.items()}
     return case, found, judged_by
@@ -453,15 +489,37 @@ def _off(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> float:
     return judged_by.own(judged_by.carried(case.final, judge.reduced))
 
 
-def _searched(
+@dataclass
+class _Begun:
+    """A library searched once, by least squares."""
+
+    problem: Problem
+    progress: Callable[[str], None]
+    base: Fit
+    search: search.Search
+    found: unnamed.Found
+    fits: Mapping[Any, Fit]
+    swapped: list[str]
+    everything: list[effects.Candidate]
+
+
+def _loose(begun: _Begun) -> loose.Loose | None:
+    """Return the thermometer that is loose for a while by what was found, if something is left and one is."""
+    if begun.swapped or not unexplained(begun.problem, begun.found[0]):
+        return None
+    begun.progress("a thermometer that comes loose")
+    return loose.find(begun.problem, begun.found[0])
+
+
+def _begun(
     problem: Problem,
     model: Model | None,
     frozen: bool,
     progress: Callable[[str], None],
     alike: bool,
     fits: Mapping[Any, Fit] | None = None,
-) -> _Case:
-    """Fit what is declared, and search the library; again where contacts changed, and where something is left.
+) -> _Begun:
+    """Fit what is declared, and search the library; again where contacts changed.
 
     `alike` by what has a name and is the same in all runs; `fits` were made by another search of these logs.
     """
@@ -478,20 +536,27 @@ def _searched(
     if alike:
         known = [c for c in known if not unseen.of_that_day(c.effect, c.variant)]
     found = search.Search(problem, known, base, progress, dict(fits or {}))
-    final, without, contenders = found.run()
+    result = found.run()
     fits = found.fits
     progress("what v / i says")
     swapped = plausibility.swapped(problem.runs)
     # beside another spring's temperature v / i would only accuse contacts
-    second = None if swapped else resistance.witness(problem, final)
+    second = None if swapped else resistance.witness(problem, result[0])
     if second and second.contacts:
         # v i is measured with the contact: its heat is not the spring's, and everything is looked for again without it
         contacts.take_heat_out(problem, second.contacts)
         base = first_fit(problem, spec)
         found = search.Search(problem, found.candidates, base, progress)
-        final, without, contenders = found.run()
+        result = found.run()
         fits = {}
-    problem.learn_power(final.spec, final.values)
+    problem.learn_power(result[0].spec, result[0].values)
+    return _Begun(problem, progress, base, found, result, fits, swapped, everything)
+
+
+def _searched(begun: _Begun, alike: bool) -> _Case:
+    """Search again where something is left."""
+    problem, progress, base, swapped = begun.problem, begun.progress, begun.base, begun.swapped
+    found, (final, without, contenders) = begun.search, begun.found
     # at its minimum: what a part of the runs hardly shows stays there
     first = _finish(problem, final) if alike and not swapped and unexplained(problem, final) else None
     hidden: list[unnamed.Hidden] = []
@@ -503,11 +568,13 @@ def _searched(
         )
     if alike and not unexplained(problem, final):
         # what is of one day may show the same, or the little that is left
-        found = search.Search(problem, everything, found.base, progress, found.fits)
+        found = search.Search(problem, begun.everything, found.base, progress, found.fits)
         final, without, contenders = found.settle(found.forward(final), grow=False)
     progress("held-out blocks")
     final = _finish(problem, final)
-    return _Case(problem, progress, found, base, found.base, final, without, contenders, swapped, hidden, fits, first)
+    return _Case(
+        problem, progress, found, base, found.base, final, without, contenders, swapped, hidden, begun.fits, first
+    )
 
 
 def _judged(case: _Case, judged_by: unseen.Unseen) -> search.Search:
