@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
-from ninespring.find import diagnosis, loose
+from ninespring.find import diagnosis, loose, search
+from ninespring.find.evidence import likelihood
 from ninespring.infer.declared import base_spec
 from ninespring.infer.fit import Fit
+from ninespring.infer.likelihood import Colour
 from ninespring.infer.predict import predict
 from ninespring.infer.problem import Problem
+from ninespring.infer.scene import scene_of
 from ninespring.io import statistics
 from ninespring.io.logs import read_log
 from ninespring.io.logs.run import Run
+from ninespring.model import effects
 from ninespring.model.models import Array
 
 TWO = Array(1, 2)
@@ -112,3 +118,32 @@ def test_what_a_model_that_never_saw_it_has_right_counts_again(tmp_path: Path, s
     assert (seen is None) == (shows == 1.0)
     if seen is not None:
         assert seen.size == pytest.approx(-0.5, abs=0.01) and 0.0 < seen.error < 0.01
+
+
+def wandering(tmp_path: Path) -> tuple[Problem, Fit, Fit]:
+    """Return a problem in which much is left, taken for noise that lasts, the declared model fitted so, and by least squares."""
+    problem, plain = fitted([two_springs(tmp_path / "1.csv", 1), two_springs(tmp_path / "2.csv", 2, drive=0.6)])
+    likelihood(problem, plain)
+    problem.take_for(plain.colour)
+    return problem, problem.fit(plain.spec, plain.as_dict(), tolerance=1e-5, errors=True), plain
+
+
+def test_a_log_is_told_of_by_the_model_that_is_given(tmp_path: Path) -> None:
+    """What lasts was taken for noise in what was found: its errors are not those of the declared model that is given instead."""
+    problem, lasting, plain = wandering(tmp_path)
+    found = search.Search(problem, effects.candidates(scene_of(problem)), lasting)
+    case = diagnosis._Case(problem, lambda _: None, found, plain, lasting, lasting, {}, [], [], [], {}, None)
+    judged_by: Any = SimpleNamespace(refitted=lambda again, _: again.base, instead=plain)
+    case.instead = True
+    given, after = diagnosis._the_given(case, judged_by)
+    assert given is plain and after.rmse_c == statistics.rms(plain.residual) < statistics.rms(lasting.residual)
+    assert problem.colour is None and case.final is not given
+
+
+def test_the_error_held_out_is_the_models_whatever_lasts(tmp_path: Path) -> None:
+    """No smoother takes from it what the readings before and after tell: they are told when a log is read, not when a run is predicted."""
+    problem, lasting, plain = wandering(tmp_path)
+    assert isinstance(problem.colour, Colour)
+    assert problem.holdout_rmse(lasting) > 0.95 * statistics.rms(lasting.residual)
+    problem.take_for(None)
+    assert problem.holdout_rmse(plain) > 0.95 * statistics.rms(plain.residual)

@@ -43,7 +43,7 @@ from . import (
     unseen,
 )
 from .certainty import CERTAIN, NAMED, Witness, witness
-from .evidence import EQUIVALENT, difference, excess, likelihood, log_evidence, unexplained
+from .evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
 from .residual import depends_on
 
 MOST_ROWS, MOST_READINGS = 6_000, 27_000
@@ -65,6 +65,9 @@ class Diagnosis:
     problem: Problem
     baseline: Fit
     final: Fit
+    """What was found."""
+    shown: Fit
+    """What the logs are told of by: that, or what is given instead."""
     heat: unknown_heat.UnknownHeat
 
     @property
@@ -328,34 +331,24 @@ def _diagnose(
     tried = candidates_of(case.search, case.final, case.base)
     if case.hidden:
         steps = _with_what_has_no_name(case, steps)
-    # as declared, by itself: with what lasts as the found model leaves it, it would be fitted to that
-    before = case.base if problem.colour is None else problem.evaluate(case.declared)
-    if left_over and not case.hidden and problem.colour is None:
-        likelihood(problem, case.final)
-        case.final.holdout = problem.holdout_rmse(case.final, case.final.colour)
-    baseline, after = _errors(case, before)
     listed, differ = _listed(case, steps, strength)
     share_with(listed, rivals, EQUIVALENT * problem.noise_c)
     progress("what v / i says")
-    second = None if case.swapped else resistance.witness(problem, case.final)
+    second = None if case.swapped else resistance.witness(problem, shown)
     impossible = doubt.impossible(second)
     if second and impossible:
         second.effects = []
+    absent = case.search.absent(case.final)
+    given, after = _the_given(case, judged_by)
+    # what is told of the logs, and of what is left of them, is told by the model that is given
+    shown = given if case.instead else case.final
+    baseline = _baseline(case)
     for one in second.effects if second else ():
         one.rmse_c, one.holdout_rmse_c = after.rmse_c, after.holdout_rmse_c
         listed.append(one)
-    residual = _left(case, left_over)
-    warnings, doubts = _warned(case, runs, left_over, impossible)
-    absent = case.search.absent(case.final)
-    if problem.colour is not None:
-        slopes = problem.plain_slopes(case.final)
-        problem.take_for(None)
-        case.final = replace(case.final, jacobian=slopes)
-    heat = unknown_heat.find(problem, case.final, progress)
-    final, given = case.final, case.carried or case.final
-    if case.instead:
-        again = search.Search(problem, case.search.candidates, case.declared)
-        given = _finish(problem, judged_by.refitted(again, judged_by.instead))
+    residual = _left(problem, shown, left_over)
+    warnings, doubts = _warned(case, shown, runs, left_over, impossible)
+    heat = unknown_heat.find(problem, shown, progress)
     told = results.Diagnosis(
         logs=[results.Read(file=Path(r.name).name, sha256=r.sha256, rows=len(r.time_s)) for r in runs],
         baseline=baseline,
@@ -370,18 +363,18 @@ def _diagnose(
         resistance=second.told if second else results.UNSET,
         residual=residual,
         candidates=tried[:40],
-        identifiability=identifiability_of(final),
+        identifiability=identifiability_of(shown),
         warnings=warnings,
         doubts=doubts,
         seconds=round(time.monotonic() - begun, 2),
         simulations=problem.simulations,
     )
-    made = model_of(problem, given, as_shown(problem, given), baseline.rmse_c, absent if given is final else None)
+    made = model_of(problem, given, as_shown(problem, given), baseline.rmse_c, absent if given is case.final else None)
     resistance.into_model(made, second)
     doubt.into_model(made, problem, given, doubts)
     judged(told.effects, made)
     results.checked(told)
-    return Diagnosis(told, made, problem, case.base, final, heat)
+    return Diagnosis(told, made, problem, case.declared, case.final, shown, heat)
 
 
 def _foretelling(
@@ -692,21 +685,42 @@ def _with_what_has_no_name(case: _Case, steps: list[tuple[str, Fit]]) -> list[tu
     return [(effect, again[id(fit)]) for effect, fit in steps]
 
 
-def _errors(case: _Case, before: Fit) -> tuple[results.Baseline, results.After]:
-    problem, final = case.problem, case.final
-    baseline = results.Baseline(
-        rmse_c=statistics.rms(before.residual),
-        holdout_rmse_c=problem.holdout_rmse(before),
-        noise_c=problem.noise_c,
-        parameters=parameters_of(problem, before),
-        effects=list(case.base.spec.effects),
+def _the_given(case: _Case, judged_by: unseen.Unseen) -> tuple[Fit, results.After]:
+    """Return the model that is given and its errors; what follows weighs readings as white noise.
+
+    What was found keeps its name and numbers where another model is given instead, and says nothing of the logs: its errors, where what
+    lasts was taken for noise, may be many times as large.
+    """
+    problem = case.problem
+    after = None if case.instead else _after(problem, case.final)
+    if problem.colour is not None:
+        slopes = problem.plain_slopes(case.final)
+        problem.take_for(None)
+        case.final = replace(case.final, jacobian=slopes)
+    if after is not None:
+        return case.carried or case.final, after
+    again = search.Search(problem, case.search.candidates, case.declared)
+    given = _finish(problem, judged_by.refitted(again, judged_by.instead))
+    return given, _after(problem, given)
+
+
+def _after(problem: Problem, fit: Fit) -> results.After:
+    return results.After(
+        rmse_c=statistics.rms(fit.residual),
+        holdout_rmse_c=problem.holdout_rmse(fit),
+        parameters=parameters_of(problem, fit),
     )
-    after = results.After(
-        rmse_c=statistics.rms(final.residual),
-        holdout_rmse_c=problem.holdout_rmse(final),
-        parameters=parameters_of(problem, final),
+
+
+def _baseline(case: _Case) -> results.Baseline:
+    """Return the errors of what is declared, by itself: by least squares, as anybody fits it."""
+    return results.Baseline(
+        rmse_c=statistics.rms(case.declared.residual),
+        holdout_rmse_c=case.problem.holdout_rmse(case.declared),
+        noise_c=case.problem.noise_c,
+        parameters=parameters_of(case.problem, case.declared),
+        effects=list(case.declared.spec.effects),
     )
-    return baseline, after
 
 
 def _listed(
@@ -745,9 +759,8 @@ def _listed(
     return listed, differ
 
 
-def _left(case: _Case, left_over: bool) -> results.Residual:
+def _left(problem: Problem, final: Fit, left_over: bool) -> results.Residual:
     """Return what is left, what it depends on, and that in words."""
-    problem, final = case.problem, case.final
     rho = statistics.autocorrelation([r / n for r, n in zip(final.residual, problem.noise, strict=True)], 1)
     depends, note = depends_on(problem, final)
     if left_over:
@@ -764,13 +777,13 @@ def _left(case: _Case, left_over: bool) -> results.Residual:
 
 
 def _warned(
-    case: _Case, runs: Sequence[Run], left_over: bool, impossible: Sequence[str]
+    case: _Case, shown: Fit, runs: Sequence[Run], left_over: bool, impossible: Sequence[str]
 ) -> tuple[list[str], list[str]]:
-    """Return what is to be said of the logs, and for which of it `export` refuses the model."""
-    problem, base, final = case.problem, case.base, case.final
+    """Return what is to be said of the logs by the model that is given, and for which of it `export` refuses that."""
+    problem, base = case.problem, case.declared
     warnings = [f"{Path(run.name).name}: {text}" for run in problem.runs for text in run.notes]
     warnings += case.not_kept
-    if any(free.knot is not None for free in final.spec.free):
+    if any(free.knot is not None for free in shown.spec.free):
         logged = all(run.ambient_c is not None for run in problem.runs)
         how = "log ambient_c nearer to the springs (their own thermometers, drifting, show the same)"
         warnings.append(f"model.toml: {DRIFT_LEFT_OUT}; {how if logged else 'log ambient_c'} to have it predicted")
@@ -778,7 +791,7 @@ def _warned(
         warnings.append(
             f"the search ended at its bound of {problem.budget.enough} simulations: there may be more to find"
         )
-    if (off_k := rested.off_k(case.search)) is not None and RUN_AMBIENT not in final.spec.effects:
+    if (off_k := rested.off_k(case.search)) is not None and RUN_AMBIENT not in case.final.spec.effects:
         warnings.append(
             f"before anything was driven the springs read {abs(off_k):.1f} K {'more' if off_k > 0 else 'less'} than ambient_c: "
             "what they lose heat to is not where it was logged, or a thermometer is off; how much of that lasts is not told here"
@@ -790,7 +803,7 @@ def _warned(
             for effect, one in case.witnesses.items()
             if one.share > MOST_OF_IT and effect in effects.IN_WORDS
         ]
-    doubts = doubt.of_log(problem, problem.runs, case.swapped, (base,) if final is base else (base, final), left_over)
+    doubts = doubt.of_log(problem, problem.runs, case.swapped, (base,) if shown is base else (base, shown), left_over)
     return warnings + doubts + [*impossible, *doubt.about_power(problem), *plausibility.coarse(runs)], doubts
 
 
