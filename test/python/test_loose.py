@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -147,3 +148,23 @@ def test_the_error_held_out_is_the_models_whatever_lasts(tmp_path: Path) -> None
     assert problem.holdout_rmse(lasting) > 0.95 * statistics.rms(lasting.residual)
     problem.take_for(None)
     assert problem.holdout_rmse(plain) > 0.95 * statistics.rms(plain.residual)
+
+
+def test_a_number_has_the_error_that_was_computed_or_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A second fit that is no better leaves the first, with errors of its own; how firmly a number was held is none."""
+    problem, plain = fitted([two_springs(tmp_path / "1.csv", 1)])
+    bare = problem.fit(plain.spec, plain.as_dict())
+    assert bare.covariance is None
+    fit = Problem.fit
+
+    def worse(self: Problem, *args: Any, **more: Any) -> Fit:
+        out = fit(self, *args, **more)
+        out.chi2 *= 1.01
+        return out
+
+    monkeypatch.setattr(Problem, "fit", worse)
+    told = diagnosis._finish(problem, bare)
+    assert told.values.tolist() == bare.values.tolist() and bare.covariance is None
+    assert told.stderr()["loss_w_per_k"] == pytest.approx(plain.stderr()["loss_w_per_k"], rel=0.05)
+    monkeypatch.undo()
+    assert diagnosis.with_everything(problem, bare, replace(plain, sse=math.inf)).covariance is None

@@ -109,9 +109,14 @@ def first_fit(problem: Problem, spec: Spec) -> Fit:
 
 
 def _finish(problem: Problem, fit: Fit) -> Fit:
-    if fit.covariance is None:
-        again = problem.fit(fit.spec, fit.as_dict(), tolerance=1e-6, errors=True)
-        return again if again.chi2 <= fit.chi2 * (1 + 1e-6) else fit
+    """Return a fit at its minimum, with the errors of its numbers."""
+    if fit.covariance is not None:
+        return fit
+    again = problem.fit(fit.spec, fit.as_dict(), tolerance=1e-6, errors=True)
+    if again.chi2 <= fit.chi2 * (1 + 1e-6):
+        return again
+    fit = replace(fit)
+    problem.add_errors(fit)
     return fit
 
 
@@ -124,11 +129,11 @@ def with_everything(problem: Problem, clean: Fit, base: Fit) -> Fit:
     fit = problem.fit(unseen.pinned(clean).spec, clean.as_dict(), tolerance=1e-4, errors=True)
     if fit.sse > base.sse:
         return problem.fit(clean.spec, clean.as_dict(), tolerance=1e-4, errors=True)
-    covariance = fit.covariance
-    if clean.covariance is not None and covariance is not None:
+    covariance = None  # that of the pinned numbers says how firmly they were held, not how well they are known
+    if clean.covariance is not None and fit.covariance is not None:
         own = np.array([free.effect is None or free.run is not None for free in clean.spec.free])
         together = np.outer(own, own)
-        covariance = np.where(together, covariance, np.where(np.outer(~own, ~own), clean.covariance, 0.0))
+        covariance = np.where(together, fit.covariance, np.where(np.outer(~own, ~own), clean.covariance, 0.0))
     return replace(fit, spec=clean.spec, covariance=covariance)
 
 
@@ -295,6 +300,8 @@ class _Case:
     """By least squares, of the first search."""
     first: Fit | None
     """What that found, where only what is alike was looked for and something is left."""
+    loose: list[loose.Loose] = field(default_factory=list)
+    """Thermometers that were for a while, none of whose readings count then."""
     witnesses: dict[str, Witness] = field(default_factory=dict)
     not_kept: list[str] = field(default_factory=list)
     """Effects that foretell a run no better, in words."""
@@ -303,8 +310,6 @@ class _Case:
     found first."""
     carried: Fit | None = None
     """What is given in place of the final fit where that foretells worse: without what is of that day."""
-    loose: list[loose.Loose] = field(default_factory=list)
-    """Thermometers that were for a while, none of whose readings count then."""
 
     @property
     def adopted(self) -> list[str]:
@@ -333,16 +338,16 @@ def _diagnose(
         steps = _with_what_has_no_name(case, steps)
     listed, differ = _listed(case, steps, strength)
     share_with(listed, rivals, EQUIVALENT * problem.noise_c)
-    progress("what v / i says")
-    second = None if case.swapped else resistance.witness(problem, shown)
-    impossible = doubt.impossible(second)
-    if second and impossible:
-        second.effects = []
     absent = case.search.absent(case.final)
     given, after = _the_given(case, judged_by)
     # what is told of the logs, and of what is left of them, is told by the model that is given
     shown = given if case.instead else case.final
     baseline = _baseline(case)
+    progress("what v / i says")
+    second = None if case.swapped else resistance.witness(problem, shown)
+    impossible = doubt.impossible(second)
+    if second and impossible:
+        second.effects = []
     for one in second.effects if second else ():
         one.rmse_c, one.holdout_rmse_c = after.rmse_c, after.holdout_rmse_c
         listed.append(one)
