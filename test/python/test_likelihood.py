@@ -47,37 +47,6 @@ def test_the_filter_is_the_gaussian_of_its_covariance() -> None:
     assert rows.step_s[25] == BROKEN
 
 
-def test_what_lasts_in_a_gap_is_told_as_a_gaussian_tells_it() -> None:
-    rng = np.random.default_rng(6)
-    time_s = np.cumsum(rng.uniform(0.5, 4.0, 30))
-    mask = np.ones((30, 3), dtype=bool)
-    mask[4] = False
-    rows = Rows.of(time_s, [0], mask)
-    colour = Colour((4.0, 0.5), (9.0, 2.0), (10.0, 900.0))
-    vector = rng.standard_normal(87)
-    fields = np.zeros(mask.shape)
-    fields[mask] = vector
-    hidden = np.zeros(mask.shape, dtype=bool)
-    hidden[12:20] = True
-    told = rows.between(vector, colour, hidden[mask])
-    apart = np.abs(time_s[:, None] - time_s[None, :])
-    known = np.flatnonzero(mask[:, 0] & ~hidden[:, 0])
-    gone = np.flatnonzero(hidden[:, 0])
-
-    def by_the_covariance(channel: np.ndarray, sizes: tuple[float, float]) -> np.ndarray:
-        covariance = sum(v * np.exp(-apart / t) for v, t in zip(sizes, colour.time_s, strict=True))
-        inside = covariance[np.ix_(known, known)] + np.eye(len(known))
-        return covariance[np.ix_(gone, known)] @ np.linalg.solve(inside, channel[known])
-
-    assert rows.turn is not None
-    turned = fields @ rows.turn.T
-    wanted = [by_the_covariance(turned[:, k], colour.apart if k else colour.together) for k in range(3)]
-    found = np.zeros(mask.shape)
-    found[mask] = told
-    assert found[gone] == pytest.approx(np.column_stack(wanted) @ rows.turn, abs=1e-8)
-    assert not found[known].any()
-
-
 def test_what_all_thermometers_share_is_told_from_what_each_has() -> None:
     rng = np.random.default_rng(2)
     rows, springs = 1500, 9

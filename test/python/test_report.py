@@ -106,7 +106,7 @@ def test_the_report_shows_what_was_found_and_needs_nothing_else(found: diagnosis
     assert page.figures == 7
     assert ["latent_heat + sensor_lag", "adopted"] in [[row[0], row[-1]] for row in page.rows]
     before, after = result["baseline"], result["after"]
-    for row, one in (("before: the declared model", before), ("after: with the effects adopted", after)):
+    for row, one in (("before: the declared model", before), ("after: the model that is given", after)):
         assert page.row(row)[1:] == [f"{one['rmse_c']:.3f}", f"{one['holdout_rmse_c']:.3f}"]
     assert page.row("noise of the sensors")[1] == f"{before['noise_c']:.3f}"
     assert "The thermometers lag 5." in text and "The transformation takes up" in text and "certain, " in text

@@ -493,11 +493,11 @@ def test_all_searches_draw_from_one_budget(make_log) -> None:
 def test_a_diagnosis_that_could_not_go_on_says_so_and_answers_with_what_it_has(
     make_log, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def jumps(columns: dict[str, np.ndarray]) -> None:
-        columns["t4_c"][200:400] += 5.0
+    def sways(columns: dict[str, np.ndarray]) -> None:
+        columns["t4_c"] += 5.0 * np.sin(np.arange(600.0) / 30.0)
 
     monkeypatch.setattr(budget, "ENOUGH", 150)
-    found = diagnosis.diagnose(Array(), [read_log(make_log(seed=3, change=jumps))]).result
+    found = diagnosis.diagnose(Array(), [read_log(make_log(seed=3, change=sways))]).result
     assert found["unexplained"]
     assert any("ended at its bound of 150 simulations" in one for one in found["warnings"])
 

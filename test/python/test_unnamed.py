@@ -298,8 +298,10 @@ def test_a_thermometer_that_comes_loose_is_none_that_always_shows_less(make_log)
         columns["t2_c"][150:] = 20.0 + 0.7 * (columns["t2_c"][150:] - 20.0)
 
     found = diagnosed(make_log, seeds=(3,), effects=WAKE, change=loosens)
-    assert [one["name"] for one in found["effects"]] == ["fan_wake"] and found["unexplained"]
-    assert any("thermometer 2 shows more of its spring's rise" in one["text"] for one in found["unnamed"])
+    assert [one["name"] for one in found["effects"]] == ["fan_wake"] and not found["unexplained"]
+    (cause,) = found["unnamed"]
+    assert "thermometer 2 shows less of its spring's rise, 150 to 599 s of run 1" in cause["text"]
+    assert cause["size"] == pytest.approx(-0.3, abs=0.01)
 
 
 def test_what_only_leads_on_what_is_there_is_not_found_the_other_way_round(make_log) -> None:

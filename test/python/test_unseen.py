@@ -217,16 +217,15 @@ def test_what_bends_as_it_likes_gives_way_to_a_name_that_foretells_better(
         False: SimpleNamespace(adopted=bends, hidden=["a cause"] if hidden else [], fits={}, off_k=off_k),
     }
     for case in cases.values():
+        case.loose = []
         case.problem = case.final = case.search = case.declared = None
         case.first = case.adopted
     given: list[Any] = []
 
-    def searched(problem: Any, model: Any, frozen: bool, progress: Any, alike: bool, fits: Any = None) -> Any:
-        given.append(fits)
-        return cases[alike]
-
     monkeypatch.setattr(diagnosis, "prepare", lambda *_: None)
-    monkeypatch.setattr(diagnosis, "_searched", searched)
+    monkeypatch.setattr(diagnosis, "_begun", lambda *begun: given.append(begun[-1]))
+    monkeypatch.setattr(diagnosis, "_loose", lambda *_: None)
+    monkeypatch.setattr(diagnosis, "_searched", lambda _, alike: cases[alike])
     monkeypatch.setattr(diagnosis, "_judged", lambda *_: None)
     monkeypatch.setattr(diagnosis, "unexplained", lambda *_: left)
     monkeypatch.setattr(diagnosis.unseen, "Unseen", lambda *_: SimpleNamespace(unjudged=None))
@@ -258,7 +257,7 @@ def test_what_is_the_same_in_all_runs_is_no_drift_and_nothing_of_a_run_alone(
     monkeypatch.setattr(diagnosis.search, "Search", begin)
     runs = [replace(one_node(0.0, seed), ambient_c=ambient) for seed, ambient in ((1, None), (2, np.full(600, 20.0)))]
     with pytest.raises(Begun) as begun:
-        diagnosis._searched(Problem(Array(1, 1), runs), None, False, lambda text: None, alike)
+        diagnosis._begun(Problem(Array(1, 1), runs), None, False, lambda text: None, alike)
     (effects,) = begun.value.args
     assert "natural_convection" in effects
     assert ("ambient_drift" in effects, bool(effects & set(OF_THAT_DAY))) == (not alike, not alike)

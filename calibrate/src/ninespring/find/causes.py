@@ -257,6 +257,75 @@ def _everywhere(
     return out
 
 
+@dataclass(frozen=True)
+class _Stepwise:
+    """What may begin and end at some rows of one run, as columns of all readings."""
+
+    run: int
+    runs: int
+    mask: np.ndarray
+    noise: np.ndarray
+    edges: np.ndarray
+    ends: tuple[int, ...]
+    samples: tuple[int, ...]
+
+    @staticmethod
+    def of(problem: Problem, r: int, samples: Sequence[int]) -> _Stepwise | None:
+        """Return it for one run; None where that has too few rows."""
+        run = problem.runs[r]
+        rows, springs = run.temperature_c.shape
+        step = float(np.median(np.diff(run.time_s)))
+        grid = max(1, round(GRID_S / step), -(-rows // min(EDGES, max(8, STEPS // springs))))
+        edges = np.arange(0, rows, grid)
+        if len(edges) < 4:
+            return None
+        ends = (*(int(edge) for edge in edges), rows)
+        return _Stepwise(r, len(problem.runs), problem.mask[r], problem.noise[r], edges, ends, tuple(samples))
+
+    def thinned(self, block: np.ndarray) -> np.ndarray:
+        """Return fields (edges, rows, springs), K, as columns (samples, edges)."""
+        return thin(np.moveaxis(np.where(self.mask, block / self.noise, 0.0), 0, 2))
+
+    def cause(self, kind: str, text: str, profile: np.ndarray, block: np.ndarray) -> Cause:
+        """Return the cause of such columns."""
+        columns = np.zeros((sum(self.samples), len(self.edges)), dtype=np.float32)
+        begin = sum(self.samples[: self.run])
+        columns[begin : begin + self.samples[self.run]] = block
+        profiles: list[np.ndarray | None] = [None] * self.runs
+        profiles[self.run] = profile
+        return Cause(kind, f"{text}, {{}} of run {self.run + 1}", tuple(profiles), columns, self.ends)
+
+    def of_thermometer(self, k: int, rise: np.ndarray) -> list[Cause]:
+        """Return what one thermometer may show: so much more, or a part more of its spring's rise (rows, springs) by the fit."""
+        rows, springs = self.mask.shape
+        jumps = steps_up(self.edges, rows, springs, k)
+        text = f"thermometer {k + 1} shows more of its spring's rise"
+        # of the fit's own rise: a part of the readings would explain all that they show
+        return [
+            self.cause("sensor", f"thermometer {k + 1} jumps", _only(k, np.ones(rows), springs), self.thinned(jumps)),
+            self.cause("share", text, _only(k, rise[:, k], springs), self.thinned(jumps * rise)),
+        ]
+
+
+def of_thermometers(problem: Problem, fit: Fit) -> list[Cause]:
+    """Return what single thermometers may show that their springs do not, in a window of one run: a simulation a run."""
+    samples = [len(range(0, len(mask), THIN)) * mask.shape[1] for mask in problem.mask]
+    out = []
+    for r, run in enumerate(problem.runs):
+        if (into := _Stepwise.of(problem, r, samples)) is not None:
+            rise = risen(problem, fit, r)
+            out += [one for k in range(run.springs) for one in into.of_thermometer(k, rise)]
+    return out
+
+
+def risen(problem: Problem, fit: Fit, r: int) -> np.ndarray:
+    """Return by how much a fit has the springs of a run above what is around them, (rows, springs), K."""
+    plant = problem.plant_for(fit.spec, fit.values, r)
+    ambient = problem.ambient_of(r, fit.as_dict())
+    around = np.full(len(problem.runs[r].time_s), plant.get("ambient_c")) if ambient is None else ambient
+    return simulate_run(plant, problem.runs[r], ambient) - around[:, None]
+
+
 def _windows(
     problem: Problem,
     fit: Fit,
@@ -269,31 +338,14 @@ def _windows(
     typical_w: float,
 ) -> list[Cause]:
     """Return what may begin and end in one run: heat, drives, losses and thermometers, each in steps at the edges."""
-    run, mask, noise = problem.runs[r], problem.mask[r], problem.noise[r]
-    step = float(np.median(np.diff(run.time_s)))
-    rows, springs = run.temperature_c.shape
-    grid = max(1, round(GRID_S / step), -(-rows // min(EDGES, max(8, STEPS // springs))))
-    edges = np.arange(0, rows, grid)
-    if len(edges) < 4:
+    into = _Stepwise.of(problem, r, samples)
+    if into is None:
         return []
-    ends = (*(int(edge) for edge in edges), rows)
-    begin = sum(samples[:r])
-
-    def thinned(block: np.ndarray) -> np.ndarray:
-        """Return fields (edges, rows, springs), K, as columns (samples, edges)."""
-        return thin(np.moveaxis(np.where(mask, block / noise, 0.0), 0, 2))
-
+    edges, ends, cause = into.edges, into.ends, into.cause
+    rows, springs = rise.shape
     # what follows from them is linear: of half a day one is twenty megabytes, thinned three
     answer = step_answers(problem, fit, r, edges, typical_w)
-    steps = [thinned(answer.pop(("heat", k))) for k in range(springs)]
-
-    def cause(kind: str, text: str, profile: np.ndarray, block: np.ndarray) -> Cause:
-        """Return the cause of such columns."""
-        columns = np.zeros((sum(samples), len(edges)), dtype=np.float32)
-        columns[begin : begin + samples[r]] = block
-        profiles: list[np.ndarray | None] = [None] * len(problem.runs)
-        profiles[r] = profile
-        return Cause(kind, f"{text}, {{}} of run {r + 1}", tuple(profiles), columns, ends)
+    steps = [into.thinned(answer.pop(("heat", k))) for k in range(springs)]
 
     def shaped(k: int, heat: np.ndarray) -> np.ndarray:
         """Return the answers to a heat of spring k that begins at each edge, from those to constant heat between edges."""
@@ -309,17 +361,13 @@ def _windows(
         warmer += shaped(k, loss_w_per_k)
         driven = shaped(k, power[:, k])
         everything_driven += driven
-        jumps = steps_up(edges, rows, springs, k)
         out.append(cause("contact", f"the drive of spring {k + 1} changes", _only(k, power[:, k], springs), driven))
         out.append(cause("heat", f"spring {k + 1} is given heat", _only(k, one, springs), steps[k]))
-        out.append(cause("sensor", f"thermometer {k + 1} jumps", _only(k, one, springs), thinned(jumps)))
-        text = f"thermometer {k + 1} shows more of its spring's rise"
-        # of the fit's own rise: a part of the readings would explain all that they show
-        out.append(cause("share", text, _only(k, rise[:, k], springs), thinned(jumps * rise)))
+        out += into.of_thermometer(k, rise)
     out.append(cause("gust", "all losses change", -lost, everything_lost))
     out.append(cause("surroundings", "the surroundings are warmer", np.outer(loss_w_per_k, np.ones(springs)), warmer))
     if springs > 1:
         every = steps_up(edges, rows, springs, slice(None))
-        out.append(cause("sensor", "all thermometers jump", np.ones((rows, springs)), thinned(every)))
+        out.append(cause("sensor", "all thermometers jump", np.ones((rows, springs)), into.thinned(every)))
         out.append(cause("supply", "all drives change", power, everything_driven))
     return out

@@ -32,6 +32,7 @@ from . import (
     doubt,
     experiments,
     lasting,
+    loose,
     plausibility,
     resistance,
     rested,
@@ -42,7 +43,7 @@ from . import (
     unseen,
 )
 from .certainty import CERTAIN, NAMED, Witness, witness
-from .evidence import EQUIVALENT, difference, excess, likelihood, log_evidence, unexplained
+from .evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
 from .residual import depends_on
 
 MOST_ROWS, MOST_READINGS = 6_000, 27_000
@@ -64,6 +65,9 @@ class Diagnosis:
     problem: Problem
     baseline: Fit
     final: Fit
+    """What was found."""
+    shown: Fit
+    """What the logs are told of by: that, or what is given instead."""
     heat: unknown_heat.UnknownHeat
 
     @property
@@ -105,9 +109,14 @@ def first_fit(problem: Problem, spec: Spec) -> Fit:
 
 
 def _finish(problem: Problem, fit: Fit) -> Fit:
-    if fit.covariance is None:
-        again = problem.fit(fit.spec, fit.as_dict(), tolerance=1e-6, errors=True)
-        return again if again.chi2 <= fit.chi2 * (1 + 1e-6) else fit
+    """Return a fit at its minimum, with the errors of its numbers."""
+    if fit.covariance is not None:
+        return fit
+    again = problem.fit(fit.spec, fit.as_dict(), tolerance=1e-6, errors=True)
+    if again.chi2 <= fit.chi2 * (1 + 1e-6):
+        return again
+    fit = replace(fit)
+    problem.add_errors(fit)
     return fit
 
 
@@ -120,11 +129,11 @@ def with_everything(problem: Problem, clean: Fit, base: Fit) -> Fit:
     fit = problem.fit(unseen.pinned(clean).spec, clean.as_dict(), tolerance=1e-4, errors=True)
     if fit.sse > base.sse:
         return problem.fit(clean.spec, clean.as_dict(), tolerance=1e-4, errors=True)
-    covariance = fit.covariance
-    if clean.covariance is not None and covariance is not None:
+    covariance = None  # that of the pinned numbers says how firmly they were held, not how well they are known
+    if clean.covariance is not None and fit.covariance is not None:
         own = np.array([free.effect is None or free.run is not None for free in clean.spec.free])
         together = np.outer(own, own)
-        covariance = np.where(together, covariance, np.where(np.outer(~own, ~own), clean.covariance, 0.0))
+        covariance = np.where(together, fit.covariance, np.where(np.outer(~own, ~own), clean.covariance, 0.0))
     return replace(fit, spec=clean.spec, covariance=covariance)
 
 
@@ -301,6 +310,8 @@ class _Case:
     """By least squares, of the first search."""
     first: Fit | None
     """What that found, where only what is alike was looked for and something is left."""
+    loose: list[loose.Loose] = field(default_factory=list)
+    """Thermometers that were for a while, none of whose readings count then."""
     witnesses: dict[str, Witness] = field(default_factory=dict)
     not_kept: list[str] = field(default_factory=list)
     """Effects that foretell a run no better, in words."""
@@ -335,34 +346,24 @@ def _diagnose(
     tried = candidates_of(case.search, case.final, case.base)
     if case.hidden:
         steps = _with_what_has_no_name(case, steps)
-    # as declared, by itself: with what lasts as the found model leaves it, it would be fitted to that
-    before = case.base if problem.colour is None else problem.evaluate(case.declared)
-    if left_over and not case.hidden and problem.colour is None:
-        likelihood(problem, case.final)
-        case.final.holdout = problem.holdout_rmse(case.final, case.final.colour)
-    baseline, after = _errors(case, before)
     listed, differ = _listed(case, steps, strength)
     share_with(listed, rivals, EQUIVALENT * problem.noise_c)
+    absent = case.search.absent(case.final)
+    given, after = _the_given(case, judged_by)
+    # what is told of the logs, and of what is left of them, is told by the model that is given
+    shown = given if case.instead else case.final
+    baseline = _baseline(case)
     progress("what v / i says")
-    second = None if case.swapped else resistance.witness(problem, case.final)
+    second = None if case.swapped else resistance.witness(problem, shown)
     impossible = doubt.impossible(second)
     if second and impossible:
         second.effects = []
     for one in second.effects if second else ():
         one.rmse_c, one.holdout_rmse_c = after.rmse_c, after.holdout_rmse_c
         listed.append(one)
-    residual = _left(case, left_over)
-    warnings, doubts = _warned(case, runs, left_over, impossible)
-    absent = case.search.absent(case.final)
-    if problem.colour is not None:
-        slopes = problem.plain_slopes(case.final)
-        problem.take_for(None)
-        case.final = replace(case.final, jacobian=slopes)
-    heat = unknown_heat.find(problem, case.final, progress)
-    final, given = case.final, case.carried or case.final
-    if case.instead:
-        again = search.Search(problem, case.search.candidates, case.declared)
-        given = _finish(problem, judged_by.refitted(again, judged_by.instead))
+    residual = _left(problem, shown, left_over)
+    warnings, doubts = _warned(case, shown, runs, left_over, impossible)
+    heat = unknown_heat.find(problem, shown, progress)
     told = results.Diagnosis(
         logs=[results.Read(file=Path(r.name).name, sha256=r.sha256, rows=len(r.time_s)) for r in runs],
         baseline=baseline,
@@ -373,22 +374,22 @@ def _diagnose(
         unexplained=bool(left_over),
         unknown_heat=heat.told(),
         runs_differ=differ,
-        unnamed=[one.told() for one in case.hidden if _counts(one)],
+        unnamed=[*(one.told() for one in case.loose), *(one.told() for one in case.hidden if _counts(one))],
         resistance=second.told if second else results.UNSET,
         residual=residual,
         candidates=tried[:40],
-        identifiability=identifiability_of(final),
+        identifiability=identifiability_of(shown),
         warnings=warnings,
         doubts=doubts,
         seconds=round(time.monotonic() - begun, 2),
         simulations=problem.simulations,
     )
-    made = model_of(problem, given, as_shown(problem, given), baseline.rmse_c, absent if given is final else None)
+    made = model_of(problem, given, as_shown(problem, given), baseline.rmse_c, absent if given is case.final else None)
     resistance.into_model(made, second)
     doubt.into_model(made, problem, given, doubts)
     judged(told.effects, made)
     results.checked(told)
-    return Diagnosis(told, made, problem, case.base, final, heat)
+    return Diagnosis(told, made, problem, case.declared, case.final, shown, heat)
 
 
 def _foretelling(
@@ -401,13 +402,34 @@ def _foretelling(
     least squares found first may foretell best: a model it may be, without naming anything.
     """
 
-    def prepared() -> Problem:
-        return prepare(model.array if model else array, runs, dict(model.parameters) if model else {})
+    left_out: list[loose.Loose] = []
+    """Thermometers that are loose for a while, none of whose readings count then: told by what is the same in all runs."""
+
+    def prepared(whole: bool = False) -> Problem:
+        logs = runs if whole else [loose.without(run, r, left_out) for r, run in enumerate(runs)]
+        return prepare(model.array if model else array, logs, dict(model.parameters) if model else {})
+
+    def begun(alike: bool, fits: Mapping[Any, Fit] | None = None) -> _Begun:
+        return _begun(prepared(), model, frozen, progress, alike, fits)
+
+    def searched(alike: bool) -> _Case:
+        first = begun(alike)
+        while len(left_out) < loose.MOST and (one := _loose(first)):
+            left_out.append(one)
+            first = begun(alike)  # what was found with such readings is found anew
+        case = _searched(first, alike)
+        if left_out:
+            whole, many = prepared(whole=True).runs, len(left_out)
+            left_out[:] = [own for one in left_out if (own := loose.seen_by(case.problem, whole, case.final, one))]
+            if len(left_out) < many:
+                # a model that never saw some of these readings has them right: they count
+                case = _searched(begun(alike), alike)
+        return case
 
     def account(alike: bool, fits: Mapping[Any, Fit] | None = None) -> _Account:
-        problem = prepared()
-        case = _searched(problem, model, frozen, progress, alike, fits)
-        judged_by = unseen.Unseen(problem, case.search, case.declared)
+        case = searched(alike) if fits is None else _searched(begun(alike, fits), alike)
+        case.loose = list(left_out)
+        judged_by = unseen.Unseen(case.problem, case.search, case.declared)
         return case, _judged(case, judged_by), judged_by
 
     if frozen:
@@ -445,7 +467,19 @@ def _rested(plain: _Case, prepared: Callable[[], Problem]) -> _Account | None:
     found, final, without = searched
     final = _finish(problem, final)
     case = _Case(
-        problem, plain.progress, found, first.base, found.base, final, without, [], plain.swapped, [], {}, None
+        problem,
+        plain.progress,
+        found,
+        first.base,
+        found.base,
+        final,
+        without,
+        [],
+        plain.swapped,
+        [],
+        {},
+        None,
+        plain.loose,
     )
     case.witnesses = {effect: witness(problem, final, effect, other, False) for effect, other in without.items()}
     return case, found, judged_by
@@ -463,15 +497,37 @@ def _off(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> float:
     return judged_by.own(judged_by.carried(case.final, judge.reduced))
 
 
-def _searched(
+@dataclass
+class _Begun:
+    """A library searched once, by least squares."""
+
+    problem: Problem
+    progress: Callable[[str], None]
+    base: Fit
+    search: search.Search
+    found: unnamed.Found
+    fits: Mapping[Any, Fit]
+    swapped: list[str]
+    everything: list[effects.Candidate]
+
+
+def _loose(begun: _Begun) -> loose.Loose | None:
+    """Return the thermometer that is loose for a while by what was found, if something is left and one is."""
+    if begun.swapped or not unexplained(begun.problem, begun.found[0]):
+        return None
+    begun.progress("a thermometer that comes loose")
+    return loose.find(begun.problem, begun.found[0])
+
+
+def _begun(
     problem: Problem,
     model: Model | None,
     frozen: bool,
     progress: Callable[[str], None],
     alike: bool,
     fits: Mapping[Any, Fit] | None = None,
-) -> _Case:
-    """Fit what is declared, and search the library; again where contacts changed, and where something is left.
+) -> _Begun:
+    """Fit what is declared, and search the library; again where contacts changed.
 
     `alike` by what has a name and is the same in all runs; `fits` were made by another search of these logs.
     """
@@ -488,20 +544,27 @@ def _searched(
     if alike:
         known = [c for c in known if not unseen.of_that_day(c.effect, c.variant)]
     found = search.Search(problem, known, base, progress, dict(fits or {}))
-    final, without, contenders = found.run()
+    result = found.run()
     fits = found.fits
     progress("what v / i says")
     swapped = plausibility.swapped(problem.runs)
     # beside another spring's temperature v / i would only accuse contacts
-    second = None if swapped else resistance.witness(problem, final)
+    second = None if swapped else resistance.witness(problem, result[0])
     if second and second.contacts:
         # v i is measured with the contact: its heat is not the spring's, and everything is looked for again without it
         contacts.take_heat_out(problem, second.contacts)
         base = first_fit(problem, spec)
         found = search.Search(problem, found.candidates, base, progress)
-        final, without, contenders = found.run()
+        result = found.run()
         fits = {}
-    problem.learn_power(final.spec, final.values)
+    problem.learn_power(result[0].spec, result[0].values)
+    return _Begun(problem, progress, base, found, result, fits, swapped, everything)
+
+
+def _searched(begun: _Begun, alike: bool) -> _Case:
+    """Search again where something is left."""
+    problem, progress, base, swapped = begun.problem, begun.progress, begun.base, begun.swapped
+    found, (final, without, contenders) = begun.search, begun.found
     # at its minimum: what a part of the runs hardly shows stays there
     first = _finish(problem, final) if alike and not swapped and unexplained(problem, final) else None
     hidden: list[unnamed.Hidden] = []
@@ -513,11 +576,13 @@ def _searched(
         )
     if alike and not unexplained(problem, final):
         # what is of one day may show the same, or the little that is left
-        found = search.Search(problem, everything, found.base, progress, found.fits)
+        found = search.Search(problem, begun.everything, found.base, progress, found.fits)
         final, without, contenders = found.settle(found.forward(final), grow=False)
     progress("held-out blocks")
     final = _finish(problem, final)
-    return _Case(problem, progress, found, base, found.base, final, without, contenders, swapped, hidden, fits, first)
+    return _Case(
+        problem, progress, found, base, found.base, final, without, contenders, swapped, hidden, begun.fits, first
+    )
 
 
 def _judged(case: _Case, judged_by: unseen.Unseen) -> search.Search:
@@ -633,21 +698,42 @@ def _with_what_has_no_name(case: _Case, steps: list[tuple[str, Fit]]) -> list[tu
     return [(effect, again[id(fit)]) for effect, fit in steps]
 
 
-def _errors(case: _Case, before: Fit) -> tuple[results.Baseline, results.After]:
-    problem, final = case.problem, case.final
-    baseline = results.Baseline(
-        rmse_c=statistics.rms(before.residual),
-        holdout_rmse_c=problem.holdout_rmse(before),
-        noise_c=problem.noise_c,
-        parameters=parameters_of(problem, before),
-        effects=list(case.base.spec.effects),
+def _the_given(case: _Case, judged_by: unseen.Unseen) -> tuple[Fit, results.After]:
+    """Return the model that is given and its errors; what follows weighs readings as white noise.
+
+    What was found keeps its name and numbers where another model is given instead, and says nothing of the logs: its errors, where what
+    lasts was taken for noise, may be many times as large.
+    """
+    problem = case.problem
+    after = None if case.instead else _after(problem, case.final)
+    if problem.colour is not None:
+        slopes = problem.plain_slopes(case.final)
+        problem.take_for(None)
+        case.final = replace(case.final, jacobian=slopes)
+    if after is not None:
+        return case.carried or case.final, after
+    again = search.Search(problem, case.search.candidates, case.declared)
+    given = _finish(problem, judged_by.refitted(again, judged_by.instead))
+    return given, _after(problem, given)
+
+
+def _after(problem: Problem, fit: Fit) -> results.After:
+    return results.After(
+        rmse_c=statistics.rms(fit.residual),
+        holdout_rmse_c=problem.holdout_rmse(fit),
+        parameters=parameters_of(problem, fit),
     )
-    after = results.After(
-        rmse_c=statistics.rms(final.residual),
-        holdout_rmse_c=problem.holdout_rmse(final),
-        parameters=parameters_of(problem, final),
+
+
+def _baseline(case: _Case) -> results.Baseline:
+    """Return the errors of what is declared, by itself: by least squares, as anybody fits it."""
+    return results.Baseline(
+        rmse_c=statistics.rms(case.declared.residual),
+        holdout_rmse_c=case.problem.holdout_rmse(case.declared),
+        noise_c=case.problem.noise_c,
+        parameters=parameters_of(case.problem, case.declared),
+        effects=list(case.declared.spec.effects),
     )
-    return baseline, after
 
 
 def _at_an_end(fit: Fit, effect: str) -> bool:
@@ -694,9 +780,8 @@ def _listed(
     return listed, differ
 
 
-def _left(case: _Case, left_over: bool) -> results.Residual:
+def _left(problem: Problem, final: Fit, left_over: bool) -> results.Residual:
     """Return what is left, what it depends on, and that in words."""
-    problem, final = case.problem, case.final
     rho = statistics.autocorrelation([r / n for r, n in zip(final.residual, problem.noise, strict=True)], 1)
     depends, note = depends_on(problem, final)
     structure_c = math.sqrt(excess(problem, final)) * problem.noise_c
@@ -717,13 +802,13 @@ def _left(case: _Case, left_over: bool) -> results.Residual:
 
 
 def _warned(
-    case: _Case, runs: Sequence[Run], left_over: bool, impossible: Sequence[str]
+    case: _Case, shown: Fit, runs: Sequence[Run], left_over: bool, impossible: Sequence[str]
 ) -> tuple[list[str], list[str]]:
-    """Return what is to be said of the logs, and for which of it `export` refuses the model."""
-    problem, base, final = case.problem, case.base, case.final
+    """Return what is to be said of the logs by the model that is given, and for which of it `export` refuses that."""
+    problem, base = case.problem, case.declared
     warnings = [f"{Path(run.name).name}: {text}" for run in problem.runs for text in run.notes]
     warnings += case.not_kept
-    if any(free.knot is not None for free in final.spec.free):
+    if any(free.knot is not None for free in shown.spec.free):
         logged = all(run.ambient_c is not None for run in problem.runs)
         how = "log ambient_c nearer to the springs (their own thermometers, drifting, show the same)"
         warnings.append(f"model.toml: {DRIFT_LEFT_OUT}; {how if logged else 'log ambient_c'} to have it predicted")
@@ -731,7 +816,7 @@ def _warned(
         warnings.append(
             f"the search ended at its bound of {problem.budget.enough} simulations: there may be more to find"
         )
-    if (off_k := rested.off_k(case.search)) is not None and RUN_AMBIENT not in final.spec.effects:
+    if (off_k := rested.off_k(case.search)) is not None and RUN_AMBIENT not in case.final.spec.effects:
         warnings.append(
             f"before anything was driven the springs read {abs(off_k):.1f} K {'more' if off_k > 0 else 'less'} than ambient_c: "
             "what they lose heat to is not where it was logged, or a thermometer is off; how much of that lasts is not told here"
@@ -743,8 +828,8 @@ def _warned(
             for effect, one in case.witnesses.items()
             if one.share > MOST_OF_IT and effect in effects.IN_WORDS
         ]
-    doubts = doubt.of_log(problem, problem.runs, case.swapped, (base,) if final is base else (base, final), left_over)
-    return warnings + doubts + [*impossible, *doubt.not_logged(problem, final), *plausibility.coarse(runs)], doubts
+    doubts = doubt.of_log(problem, problem.runs, case.swapped, (base,) if shown is base else (base, shown), left_over)
+    return warnings + doubts + [*impossible, *doubt.not_logged(problem, shown), *plausibility.coarse(runs)], doubts
 
 
 def _counts(one: unnamed.Hidden) -> bool:

@@ -139,6 +139,17 @@ def _within(window: Cause, found: Sequence[Hidden]) -> bool:
     return any(one.cause.bumps and one.text == window.often for one in found)
 
 
+def laid_bare(problem: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """Return what a fit's numbers, first readings and what is taken out can make of the readings, as a basis (samples, n), and what is
+    left beside that, (samples,): thinned, as causes are."""
+    jac = fit.jacobian if fit.jacobian is not None else np.zeros((problem.count, 0))
+    used = jac[:, np.linalg.norm(jac, axis=0) > 1e-6]
+    taken = [used, *_starts(problem), *([] if problem.unnamed is None else [problem.unnamed])]
+    basis = np.linalg.qr(thinned(problem, np.column_stack(taken)))[0]
+    left = thinned(problem, np.concatenate(problem.scaled(problem.without_errors(fit.residual)))[:, None])[:, 0]
+    return basis, left - basis @ (basis.T @ left)
+
+
 def find(
     problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[Hidden], most: int = MOST, searched: int = 0
 ) -> list[Hidden]:
@@ -147,12 +158,7 @@ def find(
     The best first, while it beats its price and explains a fair share of what is left, and more than any name would where
     there are more than the library was `searched` beside: it is searched again before more is found.
     """
-    jac = fit.jacobian if fit.jacobian is not None else np.zeros((problem.count, 0))
-    used = jac[:, np.linalg.norm(jac, axis=0) > 1e-6]
-    taken = [used, *_starts(problem), *([] if problem.unnamed is None else [problem.unnamed])]
-    basis = np.linalg.qr(thinned(problem, np.column_stack(taken)))[0]
-    left = thinned(problem, np.concatenate(problem.scaled(problem.without_errors(fit.residual)))[:, None])[:, 0]
-    left = left - basis @ (basis.T @ left)
+    basis, left = laid_bare(problem, fit)
     typical = typical_power(problem, fit)
     found = list(already)
     samples = problem.count / fit_factor(problem, fit)

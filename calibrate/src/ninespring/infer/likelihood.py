@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solveh_banded
 from scipy.optimize import minimize
 
 from ..model import native
@@ -67,29 +66,6 @@ def _filtered(
     states = np.empty(len(sizes) * columns)
     step, size, last, room, data = (native.doubles(one) for one in (step_s, sizes, lasts, states, fields))
     return float(native.library().whiten(rows, len(sizes), step, there, size, last, columns, room, data))
-
-
-def _smoothed(
-    step_s: np.ndarray, known: np.ndarray, variance: Sequence[float], time_s: Sequence[float], field: np.ndarray
-) -> np.ndarray:
-    """Return the mean of the sum of errors that last, (rows,), given a field where it is known, white noise of unit variance on it.
-
-    Errors are Markov: their precision has a band of one row, and the mean is a banded solution.
-    """
-    rows, errors = len(step_s), len(variance)
-    band = np.zeros((errors + 1, rows, errors))
-    for a, (size, lasts) in enumerate(zip(variance, time_s, strict=True)):
-        keep = np.exp(-step_s / lasts)
-        keep[0] = 0.0
-        fresh = 1.0 / (size * np.maximum(1.0 - keep**2, 1e-12))
-        band[errors, :, a] += fresh
-        band[errors, :-1, a] += (keep**2 * fresh)[1:]
-        band[0, 1:, a] -= (keep * fresh)[1:]
-    for apart in range(errors):
-        band[errors - apart, :, apart:] += known[:, None]
-    right = np.repeat(np.where(known, field, 0.0), errors)
-    found = solveh_banded(band.reshape(errors + 1, rows * errors), right)
-    return np.asarray(found).reshape(rows, errors).sum(axis=1)
 
 
 @dataclass(frozen=True)
@@ -147,24 +123,6 @@ class Rows:
             part[:, k] = one
         fields[:, self.seen] = part
         return fields[self.mask], logarithms
-
-    def between(self, vector: np.ndarray, colour: Colour, out: np.ndarray) -> np.ndarray:
-        """Return the part of a vector (readings,), in units of the noise, that lasts, where `out` is set: told by all other readings.
-
-        What a smoother says of the errors in a gap, by what they were before and after it.
-        """
-        rows, springs = self.mask.shape
-        hidden = np.zeros((rows, springs), dtype=bool)
-        hidden[self.mask] = out
-        field = np.concatenate(self.turned(vector), axis=1)
-        told = np.zeros((rows, len(self.seen)))
-        for k, there in enumerate(self.there):
-            gone = hidden[:, self.seen].any(axis=1) if self.turn is not None else hidden[:, self.seen[k]]
-            known = np.frombuffer(there, dtype=np.uint8).astype(bool) & ~gone
-            told[:, k] = _smoothed(self.step_s, known, self.sizes(colour, k), colour.time_s, field[:, k])
-        part = np.zeros((rows, springs))
-        part[:, self.seen] = told if self.turn is None else told @ self.turn
-        return np.where(out, part[self.mask], 0.0)
 
     def turned(self, vector: np.ndarray) -> list[np.ndarray]:
         """Return a vector (readings,) as the filter's channels, (rows, channels of one kind): their mean, and each its own."""

@@ -525,16 +525,15 @@ class Problem:
             self.add_errors(fit)
         return fit
 
-    def holdout_rmse(self, fit: Fit, colour: Colour | None = None) -> float:
+    def holdout_rmse(self, fit: Fit) -> float:
         """Return the rms error, degC, on blocks held out of the fit, one fold after the other.
 
         Every fifth block of about two minutes is left out, the numbers are fitted to the rest, and the error counts where
-        they have not seen the data, less what errors that last (`colour`, or that of `take_for`) are there by the readings around.
-        They move little: by the fit's slopes, within their bounds, nothing simulated.
+        they have not seen the data. They move little: by the fit's slopes, within their bounds, nothing simulated.
         """
         if not len(fit.values):
             return statistics.rms(fit.residual)
-        if colour is None and math.isfinite(fit.holdout):
+        if math.isfinite(fit.holdout):
             return fit.holdout
         free = fit.spec.free
         z = np.array([f.inner(v) for f, v in zip(free, fit.values, strict=True)])
@@ -546,10 +545,11 @@ class Problem:
         fold = self.of_samples([fold_of_rows(run)[:, None] for run in self.runs])
         noise = self.of_samples(self.noise)
         both = np.column_stack([slopes, left])
+        weighed = both if self.colour is None else self._weighed(fit)
         believed = np.column_stack([np.diag(trust), believed])
 
         def numbers(out: np.ndarray | None = None) -> np.ndarray:
-            rows = both if out is None else np.where(out[:, None], 0.0, both)
+            rows = weighed if out is None else np.where(out[:, None], 0.0, weighed)
             rows = rows if self.colour is not None else self._whitened(rows)
             return np.asarray(np.linalg.qr(np.vstack([rows, believed]), mode="r"))
 
@@ -565,17 +565,16 @@ class Problem:
             inside = np.vstack([inside, np.column_stack([stays, np.zeros(len(stays))])])
             bounds = (np.minimum(low - z, -1e-9), np.maximum(high - z, 1e-9))
             moved = lsq_linear(inside[:, :-1], -inside[:, -1], bounds, method="bvls").x
-            rest = left + slopes @ moved
-            total += float(((noise * (rest - self.lasting(rest, out, colour or self.colour)))[out] ** 2).sum())
+            total += float(((noise * (left + slopes @ moved))[out] ** 2).sum())
         fit.holdout = math.sqrt(total / max(1, self.count))
         return fit.holdout
 
-    def lasting(self, vector: np.ndarray, out: np.ndarray, colour: Colour | None) -> np.ndarray:
-        """Return what lasts of a vector (count,), in units of the noise, where `out` is set, as all other readings tell it."""
-        if colour is None:
-            return np.zeros_like(vector)
-        parts = zip(self.rows, self.by_run(vector), self.by_run(out), strict=True)
-        return np.concatenate([rows.between(part, colour, gone) for rows, part, gone in parts])
+    def _weighed(self, fit: Fit) -> np.ndarray:
+        """Return a fit's slopes and what it leaves, as what lasts has them weighed, (count, free + 1)."""
+        slopes = fit.jacobian
+        if slopes is None:
+            slopes = self.jacobian(fit.spec, fit.values, self.predictions(fit.spec, fit.values))
+        return np.column_stack([slopes, self.vector(fit.residual)])
 
     def slopes(self, fit: Fit, columns: Sequence[int] | None = None) -> np.ndarray:
         """Return d(residual vector)/d(inner coordinate) at a fit's numbers."""

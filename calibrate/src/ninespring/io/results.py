@@ -276,7 +276,7 @@ class Baseline(Part):
 
 
 class After(Part):
-    """The errors with the effects adopted, and the declared model's numbers then."""
+    """The errors of the model that is given, and its declared numbers."""
 
     rmse_c: Size | None
     holdout_rmse_c: Size | None

@@ -59,7 +59,7 @@ def _thin(n: int, most: int = 500) -> slice:
 def traces(found: Diagnosis) -> list[tuple[Markup, Markup]]:
     """Return two figures a run: temperatures, and what the models leave of them."""
     array = found.problem.array
-    fits = ((found.baseline, BEFORE, "model before"), (found.final, AFTER, "model after"))
+    fits = ((found.baseline, BEFORE, "model before"), (found.shown, AFTER, "model after"))
     figures = []
     for r, run in enumerate(found.problem.runs):
         pick = _thin(len(run.time_s))
@@ -146,7 +146,7 @@ def _in_noise(found: Diagnosis, fit: Fit) -> list[np.ndarray]:
 def array_map(found: Diagnosis) -> Markup:
     """Draw what is left at each spring in multiples of its sensor's noise, with a colour bar."""
     shape = (found.problem.array.rows, found.problem.array.cols)
-    rms = np.sqrt(statistics.mean_there(np.concatenate(_in_noise(found, found.final)) ** 2, 0))
+    rms = np.sqrt(statistics.mean_there(np.concatenate(_in_noise(found, found.shown)) ** 2, 0))
     cell = 3.0 / max(shape[1], 0.9 * shape[0])
     size = (shape[1] * cell, shape[0] * cell)
     above = max(0.1, 0.75 - 0.5 * size[1])  # words beside may be longer than what they stand beside
@@ -191,7 +191,7 @@ def maps(found: Diagnosis) -> Markup:
     problem = found.problem
     shape = (problem.array.rows, problem.array.cols)
     pictures = []
-    for fit, label in ((found.baseline, "before"), (found.final, "after")):
+    for fit, label in ((found.baseline, "before"), (found.shown, "after")):
         left = np.concatenate(fit.residual)
         pictures.append((np.sqrt(statistics.mean_there(left**2, 0)), f"rms error {label}, K", "YlOrRd", "{:.2f}"))
         pictures.append((statistics.mean_there(left, 0), f"mean error {label}, K", "RdBu_r", "{:+.2f}"))
@@ -212,7 +212,7 @@ def autocorrelation(found: Diagnosis) -> Markup:
     lags = min(120, problem.longest_lag())
     step = float(np.median(np.diff(problem.runs[0].time_s)))
     figure, (axes,) = panels(1, 2, (5.2, 2.3), (0.6, 0.1, 0.5, 0.3), (0.7, 0.0))
-    for fit, colour, label in ((found.baseline, BEFORE, "before"), (found.final, AFTER, "after")):
+    for fit, colour, label in ((found.baseline, BEFORE, "before"), (found.shown, AFTER, "after")):
         left = _in_noise(found, fit)
         rho = statistics.autocorrelation(left, lags)
         axes[0].plot(np.arange(1, lags + 1) * step, rho[1:], color=colour, label=label)

@@ -11,6 +11,7 @@ import jinja2
 
 from ..find import search
 from ..find.diagnosis import Diagnosis
+from ..find.loose import LEFT_OUT
 from ..io import results
 from ..io.logs import CUT_SHORT
 from ..model import effects, native
@@ -95,7 +96,10 @@ def findings(told: results.Diagnosis) -> list[tuple[str, str]]:
 
 def without_name(told: results.Diagnosis) -> list[tuple[str, str]]:
     """Return what acts without a name in the library, in words and sizes, as `findings` does."""
-    out = [("a cause without a name", _sentence(one.text)) for one in told.unnamed]
+    out = [
+        ("a thermometer, left out" if one.text.endswith(LEFT_OUT) else "a cause without a name", _sentence(one.text))
+        for one in told.unnamed
+    ]
     for event in told.unknown_heat.events:
         kind = "a thermometer that jumped" if event.kind == "sensor" else "heat of unknown origin"
         out.append((f"{kind} (+-{event.stderr:.2g} {event.unit})", _sentence(event.text)))

@@ -1,0 +1,300 @@
+"""A thermometer that comes loose, or jumps, for a while: what it reads then is left out, as a spike is.
+
+Its readings are no part of what a model is for: with them in the error every number bends to them, and any name that bends as well is
+given. A window of one run in which one thermometer shows a part of its spring's rise, or some kelvin beside it, competes with heat, losses and
+drives that change for a while and with noise that lasts, all by the one likelihood (infer/likelihood.py). What tells them apart is
+the step itself, from one reading to the next, which no heat makes: so its rows are found, not only those of a grid. A window that begins
+or ends some readings beside the step has two of them where the readings have one, and is less likely than none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..infer.fit import Fit
+from ..infer.problem import Problem
+from ..io import results
+from ..io.logs.run import Run
+from ..model.effects.effect import sized
+from .causes import SHORTEST, Cause, column_of, library, of_thermometers, risen, typical_power
+from .evidence import likelihood
+from .lasting import likeliest
+from .unnamed import LEAST_NATS, SHARE, STEPS_OF_FIT, Hidden, laid_bare
+from .windows import LEAST_LEFT, powers, products
+from .windows import best as most
+
+MOST = 4
+"""Windows that are left out, one after the other, at most: where more would help, the model is wrong, not the thermometers."""
+AROUND = 3
+"""Times that a window is looked for, beside numbers that it spoilt less each time."""
+LATE_S = (0.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+"""By which a thermometer may be late: it then comes loose as late."""
+FADES = 4.0
+"""Times that long until nothing of it is left."""
+LEFT_OUT = "what it reads there is left out of the fit and of all errors"
+TRUE = 0.5
+"""Part of what readings that were left out are off by, beside a model that never saw them, that must be what they were left out for."""
+
+
+@dataclass(frozen=True)
+class Loose:
+    """What one thermometer shows for a while of one run, and when none of its readings count: seconds by the log's clock."""
+
+    run: int
+    spring: int
+    kind: str
+    rows: tuple[int, int]
+    profile: np.ndarray
+    """(rows, springs): what a unit of it adds to the readings, K."""
+    since_s: tuple[float, float]
+    """From the run's first row."""
+    out_s: tuple[float, float]
+    size: float = math.nan
+    error: float = math.nan
+
+    def without(self, run: Run) -> Run:
+        """Return a log with its readings left out."""
+        gone = (run.time_s >= self.out_s[0]) & (run.time_s < self.out_s[1])
+        shown = run.temperature_c.copy()
+        shown[gone, self.spring] = np.nan
+        return replace(run, temperature_c=shown)
+
+    def told(self) -> results.Unnamed:
+        """Return what diagnosis.json says of it."""
+        when = f"{self.since_s[0]:.0f} to {self.since_s[1]:.0f} s of run {self.run + 1}"
+        if self.kind == "share":
+            what, said = "shows less of its spring's rise", sized(-self.size, self.error, "%", 100.0)
+        else:
+            what, said = "jumps", sized(self.size, self.error, "K")
+        return results.Unnamed(
+            kind=self.kind,
+            size=self.size,
+            stderr=self.error,
+            unit="1" if self.kind == "share" else "K",
+            text=f"thermometer {self.spring + 1} {what}, {when}: {said}; {LEFT_OUT}",
+        )
+
+
+def without(run: Run, number: int, left_out: Sequence[Loose]) -> Run:
+    """Return a log, the run of this number from 0, with what loose thermometers read left out."""
+    for one in left_out:
+        run = one.without(run) if one.run == number else run
+    return run
+
+
+def find(problem: Problem, final: Fit) -> Loose | None:
+    """Return the thermometer that is loose for a while by what a fit leaves, None where that is not the likeliest of all there is."""
+    window, fit = _window(problem, final)
+    problem.leave_out(None)
+    if window is None or fit is None:
+        return None
+    at_step = _at_its_step(problem, fit, window)
+    beside = _beside(problem, fit, _column(problem, at_step))
+    off, left = (max(0.0, one.sse - one.count) for one in (final, beside))
+    if off - left < SHARE * off:
+        return None
+    nats = _nats(problem, beside, _column(problem, at_step))
+    whole = column_of(problem, fit, window.cause, 1.0)
+    without = max(_nats(problem, final, None), _nats(problem, _beside(problem, fit, whole), whole))
+    if nats - math.log(problem.count * len(LATE_S)) - without < LEAST_NATS:
+        return None
+    rival = _rival(problem, final)  # chosen from about as many
+    if rival is not None and nats <= _nats(problem, _beside(problem, final, rival), rival):
+        return None
+    return at_step
+
+
+def _beside(problem: Problem, fit: Fit, column: np.ndarray) -> Fit:
+    """Return a fit's model fitted beside what a column (count, 1) can explain; nothing is taken out when this returns."""
+    problem.leave_out(column)
+    out = problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
+    problem.leave_out(None)
+    return out
+
+
+def _nats(problem: Problem, fit: Fit, column: np.ndarray | None) -> float:
+    """Return how likely a fit beside a column is where it is likeliest, with what lasts taken for noise; nothing is taken out then."""
+    problem.leave_out(column)
+    out = likelihood(problem, likeliest(problem, fit))
+    problem.leave_out(None)
+    return out
+
+
+def _slopes(problem: Problem, fit: Fit) -> Fit:
+    """Return a fit with slopes, and what it leaves as nothing is taken out."""
+    fit = problem.evaluate(fit)
+    return replace(fit, jacobian=problem.jacobian(fit.spec, fit.values, problem.predictions(fit.spec, fit.values)))
+
+
+def _window(problem: Problem, final: Fit) -> tuple[Hidden | None, Fit | None]:
+    """Return the window of one thermometer that explains most, and the fit beside it; none where heat would explain as much, or it is
+    too little to be told."""
+    fit, found = final, None
+    for turn in range(AROUND):
+        bare = _slopes(problem, fit) if turn or fit.jacobian is None else fit
+        basis, left = laid_bare(problem, bare)
+        beyond = max(1e-12, float(left @ left) - len(left))
+        drop, cause, span = max(
+            (_best(one, basis, left) for one in of_thermometers(problem, bare)), key=lambda one: one[0], default=_NONE
+        )
+        if cause is None or drop < SHARE * beyond:
+            return None, None
+        if turn == 0 and drop <= _of_others(problem, bare, basis, left)[0]:
+            return None, None
+        if found is not None and (found.cause.text, found.rows) == (cause.text, span):
+            break
+        found = Hidden(cause, cause.text, span, column_of(problem, bare, cause, 1.0, *span))
+        fit = _beside(problem, bare, found.column)
+    return found, fit
+
+
+_NONE: tuple[float, Cause | None, tuple[int, int]] = (0.0, None, (0, 0))
+
+
+def _best(cause: Cause, basis: np.ndarray, left: np.ndarray) -> tuple[float, Cause | None, tuple[int, int]]:
+    """Return what the best window of a thermometer's cause explains, and that: not all of a run, which may be another run's offset, nor
+    a part more of the rise."""
+    gram, moment = products(cause.columns, basis), np.append(cause.columns.T @ left, 0.0)
+    power, of_all = powers(gram), powers((cause.columns.T @ cause.columns).astype(float))
+    count = len(gram)
+    moments = moment[:count, None] - moment[None, :]
+    size = moments / np.maximum(power, 1e-9)
+    long = np.arange(count + 1)[None, :] - np.arange(count)[:, None]
+    possible = (long >= SHORTEST) & (long <= count - SHORTEST) & (power > LEAST_LEFT * of_all) & (power > 1e-6)
+    if cause.kind == "share":
+        possible &= size < 0.0  # how much of it, only numbers that it has not spoilt can tell
+    gain = np.where(possible, moments * size, 0.0)
+    a, b = np.unravel_index(int(np.argmax(gain)), gain.shape)
+    return float(gain[a, b]), cause, (cause.edges[a], cause.edges[b])
+
+
+def _of_others(
+    problem: Problem, fit: Fit, basis: np.ndarray, left: np.ndarray
+) -> tuple[float, tuple[Cause, tuple[int, int | None]] | None]:
+    """Return what the best of all other causes without a name explains, for a while or all the time, and that."""
+    best: tuple[float, tuple[Cause, tuple[int, int | None]] | None] = (0.0, None)
+    for one in library(problem, fit):
+        alone = one.kind in ("sensor", "share") and _spring_of(one) is not None
+        if alone or one.bumps:
+            continue
+        if one.edges:
+            of_all = powers((one.columns.T @ one.columns).astype(float))
+            drop, a, b = most(one.columns.T @ left, products(one.columns, basis), SHORTEST, of_all)
+            best = max(best, (drop, (one, (one.edges[a], one.edges[b]))), key=lambda it: it[0])
+            continue
+        column = one.columns[:, 0] - basis @ (basis.T @ one.columns[:, 0])
+        if float(column @ column) > LEAST_LEFT * float(one.columns[:, 0] @ one.columns[:, 0]):
+            gain_of_it = float(column @ left) ** 2 / float(column @ column)
+            best = max(best, (gain_of_it, (one, (0, None))), key=lambda it: it[0])
+    return best
+
+
+def _rival(problem: Problem, final: Fit) -> np.ndarray | None:
+    """Return what the best of all other causes adds to the readings, (count, 1)."""
+    bare = final if final.jacobian is not None else _slopes(problem, final)
+    _, found = _of_others(problem, bare, *laid_bare(problem, bare))
+    if found is None:
+        return None
+    return column_of(problem, bare, found[0], typical_power(problem, bare), *found[1])
+
+
+def _spring_of(cause: Cause) -> int | None:
+    """Return the spring, from 0, whose thermometer alone a cause is of."""
+    springs = {int(k) for profile in cause.profiles if profile is not None for k in np.flatnonzero(profile.any(axis=0))}
+    return springs.pop() if len(springs) == 1 else None
+
+
+def _at_its_step(problem: Problem, fit: Fit, window: Hidden) -> Loose:
+    """Return a window with its ends where the readings step, and as late as they do."""
+    cause = window.cause
+    r = next(number for number, profile in enumerate(cause.profiles) if profile is not None)
+    k = _spring_of(cause) or 0
+    run, shape = problem.runs[r], cause.profiles[r]
+    assert shape is not None
+    rows, grid = len(run.time_s), cause.edges[1] - cause.edges[0]
+    left = np.nan_to_num(problem.without_errors(problem.evaluate(fit).residual)[r][:, k])
+    unit = np.where(problem.mask[r][:, k], shape[:, k], 0.0)
+    best: tuple[float, tuple[int, int], np.ndarray] | None = None
+    for late_s in LATE_S:
+        begin, end = window.rows[0], rows if window.rows[1] is None else min(window.rows[1], rows)
+        for _ in range(AROUND):
+            size = _size(left, unit * _there(run, begin, end, late_s))
+            starts = _near(begin, grid, 1, end - 1) if begin else [0]
+            begin = min(starts, key=lambda row: _off(left, unit * _there(run, row, end, late_s), size))
+            ends = _near(end, grid, begin + 1, rows) if end < rows else [rows]
+            end = min(ends, key=lambda row: _off(left, unit * _there(run, begin, row, late_s), size))
+        field = unit * _there(run, begin, end, late_s)
+        off = _off(left, field, _size(left, field))
+        if best is None or off < best[0]:
+            fade = max(FADES * late_s, float(run.time_s[grid] - run.time_s[0]))
+            best = off, (begin, end), field
+            late = fade
+    assert best is not None
+    (begin, end), profile = best[1], np.zeros((rows, run.springs))
+    profile[:, k] = best[2]
+    first, last = float(run.time_s[0]), float(run.time_s[end]) if end < rows else math.inf
+    step_s = float(run.time_s[grid] - run.time_s[0])
+    came = float(run.time_s[begin])
+    since = came - first, min(last, float(run.time_s[-1])) - first
+    return Loose(r, k, cause.kind, (begin, end), profile, since, (came - step_s if begin else -math.inf, last + late))
+
+
+def _near(row: int, grid: int, least: int, most: int) -> range:
+    return range(max(least, row - grid), max(least, min(most, row + grid)) + 1)
+
+
+def _there(run: Run, begin: int, end: int, late_s: float) -> np.ndarray:
+    """Return what part of a window is there in each row, (rows,), for a thermometer that is so late."""
+    time_s = run.time_s
+    out = np.zeros(len(time_s))
+    out[begin:end] = 1.0
+    if late_s > 0.0:
+        if begin:
+            out[begin:end] -= np.exp(-(time_s[begin:end] - time_s[begin]) / late_s)
+        if end < len(time_s):
+            out[end:] = out[end - 1] * np.exp(-(time_s[end:] - time_s[end]) / late_s)
+    return out
+
+
+def _size(left: np.ndarray, field: np.ndarray) -> float:
+    return float(field @ left) / max(1e-12, float(field @ field))
+
+
+def _off(left: np.ndarray, field: np.ndarray, size: float) -> float:
+    return float(((left - size * field) ** 2).sum())
+
+
+def _column(problem: Problem, one: Loose) -> np.ndarray:
+    """Return what a unit of it adds to the readings of all, (count, 1)."""
+    fields = [np.zeros_like(run.temperature_c) for run in problem.runs]
+    fields[one.run] = one.profile
+    return np.concatenate(problem.scaled(fields))[:, None]
+
+
+def seen_by(problem: Problem, whole: Sequence[Run], fit: Fit, one: Loose) -> Loose | None:
+    """Return it as large as a model has it that never saw its readings; None where that does not find them off by most of what they are.
+
+    `whole` are the logs as they were read, in the problem's rows.
+    """
+    r, k, (begin, end) = one.run, one.spring, one.rows
+    rise = risen(problem, fit, r)[:, k] if one.kind == "share" else np.ones(len(problem.runs[r].time_s))
+    shown = problem.predictions(fit.spec, fit.values)[r][:, k]
+    off = (whole[r].temperature_c[:, k] - shown)[begin:end]
+    unit = rise[begin:end]
+    there = np.isfinite(off)
+    off, unit = off[there], unit[there]
+    size = _size(off, unit)
+    noise = float(problem.noise[r][k]) ** 2 * len(off)
+    squares, left = float(off @ off), _off(off, unit, size)
+    possible = -1.0 <= size < 0.0 or one.kind != "share"
+    if not possible or max(0.0, squares - noise) * (1.0 - TRUE) < max(0.0, left - noise):
+        return None
+    alike = problem.alike(
+        [np.where(np.isfinite(x), x, 0.0) for x in [((off - size * unit) / problem.noise[r][k])[:, None]]]
+    )
+    error = math.sqrt(alike * max(left, noise) / max(1, len(off)) / max(1e-12, float(unit @ unit)))
+    return replace(one, size=size, error=error)
