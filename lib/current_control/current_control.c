@@ -88,11 +88,7 @@ bool current_control_apply(current_control_t *control, const current_control_par
     for (uint8_t k = 0; k < CURRENT_CONTROL_MAX_CHANNELS; k++) {
         current_control_channel_t *c = &control->channel[k];
         const uint32_t sum_mohm = ((uint32_t)c->estimate_q16 << 8) / gain_q24_per_mohm;
-        const uint32_t most_mohm = fixed_mohm + (uint32_t)UINT16_MAX;
-        estimate_anew(control, c,
-                      sum_mohm <= fixed_mohm
-                          ? 0
-                          : (uint16_t)((sum_mohm < most_mohm ? sum_mohm : most_mohm) - fixed_mohm));
+        estimate_anew(control, c, sum_mohm > fixed_mohm ? (uint16_t)(sum_mohm - fixed_mohm) : 0);
     }
     current_control_set_drop(control, p->freewheel_mv);
     return true;

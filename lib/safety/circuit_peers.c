@@ -92,10 +92,12 @@ static others_t ask_others(const circuit_peers_t *peers, uint8_t springs, uint8_
     if (count == 0) {
         return others;
     }
-    others.peer = &peers->spring[sorted[others.outvotes ? count / 2u : 0]];
-    for (uint8_t n = 1; n < count && !others.outvotes; n++) {
-        const circuit_peer_t *const other = &peers->spring[sorted[n]];
-        others.peer = other->shown_16mv > others.peer->shown_16mv ? other : others.peer;
+    if (others.outvotes) {
+        others.peer = &peers->spring[sorted[count / 2u]];
+    } else {
+        const circuit_peer_t *const first = &peers->spring[sorted[0]];
+        const circuit_peer_t *const last = &peers->spring[sorted[count - 1u]];
+        others.peer = last->shown_16mv > first->shown_16mv ? last : first;
     }
     others.alike = are_alike(peers->spring[k].shown_16mv, others.peer->shown_16mv);
     others.share = (float)others.peer->share_q7 / SHARE_Q7;
@@ -261,7 +263,7 @@ static verdict_t beside_itself(const circuit_peer_t *own, bool sure, const other
     const bool is_less = window->share < was;
     const float alone_part = is_less ? ALONE_LESS_PART : ALONE_MORE_PART;
     const float off = beyond(window->share, was, sure ? KNOWN_PART : alone_part);
-    if (off <= 0.0f && !was_found(own)) {
+    if (off <= 0.0f) {
         return (verdict_t){.good = true};
     }
     const float apart_part = apart(expected_mv, was_mv);
@@ -271,10 +273,10 @@ static verdict_t beside_itself(const circuit_peer_t *own, bool sure, const other
                     (others->mv * was_mv);
     }
     const float off_mv = off * expected_mv - moved_mv;
-    return (verdict_t){.good = off_mv <= (was_found(own) ? -moved_mv : 0.0f),
+    return (verdict_t){.good = off_mv <= 0.0f && !was_found(own),
                        .odd =
                            off_mv > unsure_mv(source, is_less, expected_mv < was_mv) * apart_part,
-                       .only_offsets = off > 0.0f};
+                       .only_offsets = true};
 }
 
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
@@ -316,7 +318,6 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     } else if (own->beside && own->was_q7 != 0 && !is.odd) {
         const verdict_t itself = beside_itself(own, true, &others, window, source, offsets_mv);
         is.odd = itself.odd;
-        is.good = is.good && itself.good;
         is.only_offsets = itself.only_offsets;
     }
     if (is.odd) {

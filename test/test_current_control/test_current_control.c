@@ -401,10 +401,14 @@ TEST(another_declaration_moves_no_duty)
         }
         TEST_ASSERT_INT32_WITHIN(8000, 2700000, mean_ua(2700, 20));
         TEST_ASSERT_EQUAL_INT32(900 * 256, control.channel[1].trim_q24);
-        const int16_t estimate_q16 = control.channel[1].estimate_q16;
-        current_control_set_resistance(&control, 1, 190);
-        TEST_ASSERT_INT16_WITHIN(12, control.channel[1].estimate_q16,
-                                 estimate_q16); /* a milliohm */
+        current_control_t anew;
+        TEST_ASSERT_TRUE(current_control_init(&anew, &parameters, NULL));
+        current_control_set_resistance(&anew, 1, 190);
+        TEST_ASSERT_INT16_WITHIN(12, anew.channel[1].estimate_q16, /* a milliohm */
+                                 control.channel[1].estimate_q16);
+        TEST_ASSERT_EQUAL_UINT16(anew.gain_q24_per_mohm, control.gain_q24_per_mohm);
+        TEST_ASSERT_EQUAL_UINT16(anew.fixed_mohm, control.fixed_mohm);
+        TEST_ASSERT_EQUAL_INT32(anew.offset_q16, control.offset_q16);
     }
 }
 
