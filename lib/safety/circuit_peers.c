@@ -24,9 +24,8 @@
 #define ALONE_LESS_PART 0.10f
 #define ALONE_MORE_PART 0.20f
 #define LEARN_MOST      127u /* windows: 76 s. What is soldered stays what it is */
-#define KEEP_PART                                                                                  \
-    0.25f /* of what it shows beside the others now: a part of a window is no more                 \
-           */
+/* Of what it shows beside the others now, so that a part of a window is no more. */
+#define KEEP_PART 0.25f
 
 /* Shares of the others that are driven, sorted; how many. */
 static uint8_t sort_others(const circuit_peers_t *peers, uint8_t springs, uint8_t k,

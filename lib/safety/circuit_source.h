@@ -60,10 +60,9 @@ void circuit_source_take(circuit_source_t *source, float duty, float voltage_mv)
 /* Ends the round: what is believed is what fits best to mean duties and voltages of this round and
  * of those before, supply and drop as they are declared, each by its tolerance. A voltage that
  * moves with the duty tells both; one at about the same duty only what they make together. Duties
- * that differ within a round tell most, as it has one supply; from round to round that may move by
- * 2
- * %, as others load and leave it. True if
- * and only if another belief is taken: small changes are not worth it. */
+ * that differ within a round tell most, as it has one supply, which may move by a fiftieth from
+ * round to round, as others load and leave it. True if and only if another belief is taken: small
+ * changes are not worth it. */
 bool circuit_source_fit(circuit_source_t *source, const current_control_parameters_t *circuit);
 
 #ifdef __cplusplus
