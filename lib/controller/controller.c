@@ -457,11 +457,15 @@ static void raise_ceiling(controller_t *controller, uint8_t k)
     }
 }
 
-/* The current loop of one spring after the other learns of its phase, which moves slowly. */
+/* The current loop of one spring after the other learns of its phase, which moves slowly; its
+ * readings' steps are told by that loop. */
 static void take_resistance_turn(controller_t *controller)
 {
     const uint8_t k = controller->resistance_turn;
     tell_resistance(controller, k);
+    spring_estimator_sweep(&controller->estimator, k,
+                           current_control_gain_q16(&controller->current, k),
+                           controller->policy.parameters.dither_ma);
     controller->resistance_turn = (uint8_t)(k + 1u < controller->springs ? k + 1u : 0u);
 }
 

@@ -257,3 +257,9 @@ uint16_t current_control_reference_ma(const current_control_t *control, uint8_t 
 {
     return control->channel[channel].reference_ma;
 }
+
+uint16_t current_control_gain_q16(const current_control_t *control, uint8_t channel)
+{
+    const current_control_channel_t *c = &control->channel[channel];
+    return loop_gain_q16(c->estimate_q16, c->trim_q24);
+}

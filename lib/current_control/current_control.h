@@ -109,6 +109,9 @@ void current_control_tick(current_control_t *control, uint8_t channels, const ui
 /* Duty given in the last tick; 0 after a reset. */
 uint16_t current_control_duty(const current_control_t *control, uint8_t channel);
 
+/* Duty steps that a mA more takes, in Q16: its loop as it is estimated, and as it was learnt. */
+uint16_t current_control_gain_q16(const current_control_t *control, uint8_t channel);
+
 /* Slew-limited reference of the last tick, mA. */
 uint16_t current_control_reference_ma(const current_control_t *control, uint8_t channel);
 

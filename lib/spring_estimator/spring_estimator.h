@@ -97,6 +97,8 @@ typedef struct {
     uint8_t settling;   /* to be left out, after a jump of the current */
     bool cut_short : 1; /* there was such a jump in the running turn */
     bool left : 1;      /* nothing is asked of it any more: the next turn ends what ran */
+    uint8_t coarse : 4; /* so far apart its average voltages may be, 0.1 mV, by its sensor's steps
+                         * alone; told anew all the time, too */
     uint16_t current_sum_ma;
     uint16_t voltage_sum_mv;
     /* the error of that temperature: variances of what the loss explains, and of the heat capacity
@@ -292,6 +294,11 @@ void spring_estimator_look_at_stiffness(spring_estimator_t *estimator, const the
 
 /* The current jumps: readings on the way are left out. */
 void spring_estimator_disturb(spring_estimator_t *estimator, uint8_t spring);
+/* By its duty's steps: a mA takes so many of them, in Q16, and its current sweeps over so many mA.
+ * Where each moves the voltage by a whole step of the sensor, all of the sweep is rounded alike,
+ * and averages keep what one reading has. */
+void spring_estimator_sweep(spring_estimator_t *estimator, uint8_t spring, uint16_t gain_q16,
+                            uint16_t sweep_ma);
 /* A heating begins: what the resistance does from here on tells of the transformation. In its turn,
  * once that has been updated; as a hold does. */
 void spring_estimator_begin_heating(spring_estimator_t *estimator, const thermal_model_t *model,

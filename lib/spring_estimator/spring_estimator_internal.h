@@ -49,6 +49,11 @@
 #define LOSS_MOST      0.45f   /* of the declared loss: no more is ever believed */
 #define LOSS_FLOOR     (-0.8f) /* and no less: under a cloth it is a third */
 
+#define LOSS_LEAST    0.0012f /* of the resistance: what a sensor's steps leave in the average */
+#define COARSE_V      0.0001f /* unit of what they may leave where all of a sweep is rounded alike */
+#define ANCHOR_K      3.0f    /* 0.45 % of the resistance by the largest coefficient */
+#define CROSSING_SD_K 1.0f
+
 #define OFFSET_MOST_V 0.012f /* no sensor's is larger */
 
 /* ---- what is noted of a sight, for whoever asks why; nothing is decided by it ---- */
@@ -184,10 +189,39 @@ float spring_read_tolerance(const spring_belief_t *belief);
 /* It has transformed: what it reads now is its own austenite's, and the way there its change. */
 void spring_learn_austenite(spring_belief_t *belief);
 
+/* ---- a line: what a resistance is compared with while its spring is not heated ---- */
+
 /* A hold begins. Now: what the last turn read is what it reads with the phase that it has. */
 void spring_begin_hold_line(const spring_estimator_t *estimator, spring_belief_t *belief, bool now);
 /* What the sensor's offset may add to a resistance from one current to another, relative. */
 float spring_offset_may_show(const spring_belief_t *belief, float ohm, float from_a, float to_a);
+/* The average begins with the last turn's. */
+void spring_average_anew(spring_belief_t *belief);
+/* Of the average, relative; share: of a turn in it. */
+float spring_slow_variance(const spring_belief_t *belief, float share);
+/* What it reads on average now is what it reads with the phase that it has. Rough: it still moves,
+ * another one follows when it is at rest. */
+void spring_begin_line(spring_belief_t *belief, bool rough, float share);
+/* By how much its resistance has left its line; on trial, since that began, what does not go back.
+ */
+float spring_has_left(const spring_belief_t *belief);
+/* That is not the way of lost phase. */
+bool spring_is_other_way(const spring_belief_t *belief, float left);
+/* How a resistance that has left its line compares with all that may do so while phase is kept. */
+typedef struct {
+    float noise2; /* of the average and the line, relative, squared */
+    float least;  /* what no average tells */
+    float unsure; /* one standard deviation of what moves it otherwise; where it is sure */
+    bool sure;    /* it has left it: by so much, or suspected for so long */
+} spring_departure_t;
+/* Of what has changed, squared; least2: what else it may be at least; sds of noise are sure. Counts
+ * for how long it is suspected. */
+spring_departure_t spring_departs(spring_belief_t *belief, const thermal_model_t *model,
+                                  uint8_t spring, float changed2, float least2, float sds,
+                                  float share);
+/* Where it is on its way down, having lost so much of its phase. */
+float spring_lost_at_c(const thermal_model_t *model, uint8_t spring, float lost);
+
 /* While it heats: what heat does to its resistance. */
 void spring_heating_watch(spring_estimator_t *estimator, spring_belief_t *belief,
                           thermal_model_t *model, uint8_t spring);

@@ -42,15 +42,14 @@ void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t
 }
 
 /* Where it is when its onset is seen: what a small change shows late has taken up heat by then. */
-static float onset_c(const spring_estimator_t *e, const spring_belief_t *b,
-                     const thermal_model_t *model, uint8_t k)
+static float onset_c(const spring_estimator_t *e, const spring_belief_t *b, float start_c)
 {
     const float taken_k = b->run.heat.heat_k - b->run.heat.onset_k;
-    return spring_c(thermal_model_transformation(model, k).austenite_start_c7) +
-           fmaxf(e->transforms_k_per_k * taken_k, ONSET_K);
+    return start_c + fmaxf(e->transforms_k_per_k * taken_k, ONSET_K);
 }
 
-static void see_onset(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k)
+static void see_onset(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
+                      float start_c)
 {
     const spring_before_t before = spring_before(b, model, k);
     const float now_c = spring_now_c(model, k);
@@ -71,7 +70,7 @@ static void see_onset(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
                 l->martensite_ohm = martensite_ohm;
             } /* else a contact has moved */
         }
-        const float seen_c = onset_c(e, b, model, k);
+        const float seen_c = onset_c(e, b, start_c);
         spring_share_onset(e, b, model, k, seen_c);
         (void)spring_see(e, b, model, k, seen_c, SHIFT_SD_K, SPRING_PHASE_MARTENSITE);
         spring_note(e, model, k, SPRING_SIGHT_ONSET, &before, seen_c, SHIFT_SD_K);
@@ -147,11 +146,11 @@ static void hold_back(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
 }
 
 /* As hot as it may be it has come to its austenite start. */
-static bool may_transform(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
+static bool may_transform(const spring_belief_t *b, const thermal_model_t *model, uint8_t k,
+                          float start_c)
 {
     return b->possible != SPRING_PHASE_MARTENSITE ||
-           spring_now_c(model, k) + SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b) >
-               spring_c(thermal_model_transformation(model, k).austenite_start_c7);
+           spring_now_c(model, k) + SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b) > start_c;
 }
 
 /* It changes no more, in more heat than the last of its change may hide in; and what it changed by
@@ -274,8 +273,9 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         b->run.heat.flat_k = 0.0f;
     }
     if (!b->onset && fabsf(b->run.heat.excess) > EXCESS_SEEN + EXCESS_SDS * b->noise) {
-        if (may_transform(b, model, k)) {
-            see_onset(e, b, model, k);
+        const float start_c = spring_c(thermal_model_transformation(model, k).austenite_start_c7);
+        if (may_transform(b, model, k, start_c)) {
+            see_onset(e, b, model, k, start_c);
             b->steep = true;
         } else {
             const spring_before_t before = spring_before(b, model, k);

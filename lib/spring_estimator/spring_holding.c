@@ -4,65 +4,20 @@
 
 #define QUIET_K 0.08f /* a turn's: 0.3 K/s */
 /* Of a turn, 60 s: what the line follows is no loss of phase. */
-#define LINE_SHARE    (1.0f / 240.0f)
-#define LOSS_LEAST    0.0012f /* of the resistance: what a sensor's steps leave in the average */
-#define NOISE_IN_SLOW 0.18f   /* of one turn's, with all turns in it: sqrt(share / (2 - share)) */
+#define LINE_SHARE (1.0f / 240.0f)
 /* Mean size of a second difference of averages, each of which still has a third of the one before
  * in it. */
 #define SLOW_BEND_TO_SD  0.68f
 #define SLOW_NOISE_SHARE ((float)SLOW_TURNS * LINE_SHARE) /* as the line follows */
-#define ANCHOR_K         3.0f /* 0.45 % of the resistance by the largest coefficient */
 /* Of its temperature, by steps of the surroundings in 60 s: 12 K, by a fifth of the loss, once in a
  * quarter of an hour. */
 #define STEPS_K        3.0f
-#define SUSPECTED      0.6f /* of what is sure: 3 of 5 */
 #define OTHER_WAY      2.0f /* times as much: an intermediate phase, where drifts go either way */
-#define LASTING_TURNS  60   /* 15 s of suspicion are as sure */
-#define CROSSING_SD_K  1.0f
-#define APART_PER_A    0.5f    /* between two currents, as of 3 and 1.2 A */
+#define APART_PER_A    0.5f /* between two currents, as of 3 and 1.2 A */
 #define OFFSET_LEAST_V 0.0005f /* what a turn's steps of 4 mV leave, and its noise */
-#define OFFSET_SDS     3.0f
 /* Of an average: so little phase may be lost unseen, and it tells anew in 2 x 16 turns. */
 #define LINE_VARIANCE (32.0f * LOSS_LEAST * LOSS_LEAST)
-#define STILL_K       0.5f  /* below where it would be seen */
-#define COSINE_BEGINS 0.64f /* 2 / pi: x where a cosine has sqrt(lost) = (pi / 2) x */
-
-/* Where it is on its way down, having lost so much: the beginning of the cosine, (1 - cos pi x)
- * / 2. */
-static float lost_at_c(const thermal_model_t *model, uint8_t k, float lost)
-{
-    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
-    const float width_k = spring_c((int16_t)(t.martensite_start_c7 - t.martensite_finish_c7));
-    const float depth = lost > 0.0f ? COSINE_BEGINS * sqrtf(fminf(lost, 1.0f)) : 0.0f;
-    return spring_c(t.martensite_start_c7) - width_k * depth;
-}
-
-static void average_anew(spring_belief_t *b)
-{
-    b->slow_ohm = b->ohm;
-    b->slow_a = b->current_a;
-    b->averaged = 1;
-    b->run.line.slow_k = b->run.line.way_k;
-}
-
-static float slow_variance(const spring_belief_t *b, float share)
-{
-    const float averages = b->averaged < SLOW_TURNS ? share : NOISE_IN_SLOW * NOISE_IN_SLOW;
-    return fmaxf(b->noise * b->noise * averages, b->learnt.slow_noise * b->learnt.slow_noise);
-}
-
-/* What it reads on average now is what it reads with the phase that it has. Rough: it still moves,
- * another one follows when it is at rest. */
-static void begin_line(spring_belief_t *b, bool rough, float share)
-{
-    b->run.line.ohm = b->slow_ohm;
-    b->run.line.a = b->slow_a;
-    b->run.line.variance = slow_variance(b, share);
-    b->run.line.way_k -= b->run.line.slow_k;
-    b->run.line.slow_k = 0.0f;
-    b->rough = rough;
-    b->losing = 0;
-}
+#define STILL_K       0.5f /* below where it would be seen */
 
 /* In a frame of its own: inlined, avr-gcc 5.4 tears a pointer (test/board_code). */
 __attribute__((noinline)) static void see_crossing(spring_estimator_t *e, spring_belief_t *b,
@@ -72,8 +27,8 @@ __attribute__((noinline)) static void see_crossing(spring_estimator_t *e, spring
     const spring_before_t before = spring_before(b, model, k);
     const bool searched = spring_estimator_sd_k(b) > 3.0f * CROSSING_SD_K;
     b->lost = fminf(b->lost + lost, 1.0f);
-    const float seen_c = lost_at_c(model, k, b->lost);
-    const float unsure_k = seen_c - lost_at_c(model, k, b->lost + lost_sd);
+    const float seen_c = spring_lost_at_c(model, k, b->lost);
+    const float unsure_k = seen_c - spring_lost_at_c(model, k, b->lost + lost_sd);
     const float sd_k = sqrtf(CROSSING_SD_K * CROSSING_SD_K + unsure_k * unsure_k);
     const bool opened = spring_open_to_step(e, b, k, seen_c - spring_now_c(model, k), sd_k);
     const float error_k = spring_see(e, b, model, k, seen_c, sd_k, SPRING_PHASE_AUSTENITE);
@@ -91,7 +46,7 @@ __attribute__((noinline)) static void see_crossing(spring_estimator_t *e, spring
 static bool is_misread(const spring_belief_t *b, const thermal_model_t *model, uint8_t k,
                        float lost)
 {
-    const float colder_k = spring_now_c(model, k) - lost_at_c(model, k, b->lost + lost);
+    const float colder_k = spring_now_c(model, k) - spring_lost_at_c(model, k, b->lost + lost);
     const float unsure_k = sqrtf(spring_distance_k2(b) + CROSSING_SD_K * CROSSING_SD_K);
     return colder_k > SHIFT_BOUND_K + SPRING_ESTIMATOR_LIKELY_SDS * unsure_k;
 }
@@ -110,7 +65,8 @@ static bool learn_offset(spring_belief_t *b)
     const float moved_v = COEFFICIENT_MOST_PER_K * b->run.line.way_k * b->run.line.ohm * apart_a;
     const float noise_v = b->noise * b->ohm * apart_a;
     const float prior_v2 = b->offset_sd_v * b->offset_sd_v;
-    const float read_v2 = OFFSET_LEAST_V * OFFSET_LEAST_V + noise_v * noise_v + moved_v * moved_v;
+    const float least_v = fmaxf(OFFSET_LEAST_V, COARSE_V * (float)b->coarse);
+    const float read_v2 = least_v * least_v + noise_v * noise_v + moved_v * moved_v;
     const float gain = prior_v2 / (prior_v2 + read_v2);
     const float more_v = gain * (b->ohm - b->run.line.ohm) * apart_a;
     if (fabsf(b->learnt.offset_v + more_v) > OFFSET_MOST_V) {
@@ -122,23 +78,9 @@ static bool learn_offset(spring_belief_t *b)
     b->run.line.ohm -= more_ohm;
     b->learnt.austenite_ohm -= b->learnt.austenite_ohm > 0.0f ? more_ohm : 0.0f;
     b->ohm -= more_v / b->current_a;
-    average_anew(b); /* what was read before is off by it */
-    b->seen = true;  /* it is acted on in the next turn */
+    spring_average_anew(b); /* what was read before is off by it */
+    b->seen = true;         /* it is acted on in the next turn */
     return true;
-}
-
-float spring_offset_may_show(const spring_belief_t *b, float ohm, float from_a, float to_a)
-{
-    return OFFSET_SDS * b->offset_sd_v * fabsf(from_a - to_a) / (from_a * to_a * ohm);
-}
-
-/* By how much, squared, the resistance may have left its line with the phase kept: its temperature
- * moves it, and another current shows another share of the sensor's offset. */
-static float may_move_squared(const spring_belief_t *b)
-{
-    const float moves = SPRING_ESTIMATOR_BOUND_SDS * b->run.line.rise_sd_per_k * b->run.line.slow_k;
-    const float offset = spring_offset_may_show(b, b->run.line.ohm, b->run.line.a, b->slow_a);
-    return moves * moves + offset * offset;
 }
 
 /* It keeps its phase: how what it reads goes with a moving temperature is its slope. */
@@ -150,19 +92,6 @@ static void tell_slope(spring_line_t *line, float left)
     line->rise_per_k = spring_clamp(line->rise_per_k + gain * left, -COEFFICIENT_MOST_PER_K,
                                     COEFFICIENT_MOST_PER_K);
     line->rise_sd_per_k = sqrtf(prior * (1.0f - gain * way_k));
-}
-
-void spring_begin_hold_line(const spring_estimator_t *e, spring_belief_t *b, bool now)
-{
-    b->trial = false;
-    b->run.line = (spring_line_t){
-        .rise_per_k = e->rise_per_k,
-        .rise_sd_per_k = spring_alloy_rise_sd_per_k(e),
-    };
-    if (now) {
-        average_anew(b);
-        begin_line(b, true, 1.0f);
-    }
 }
 
 /* What of its slope is more than its sd: one that was never seen moves nothing. */
@@ -211,16 +140,11 @@ static void follow(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *m
     }
 }
 
-static bool is_other_way(const spring_belief_t *b, float left)
-{
-    return left * b->learnt.change > 0.0f;
-}
-
 /* Of what the resistance has left its line by, the part that lost phase may explain; the other way
  * it is an intermediate phase's. */
 static float as_lost(const spring_belief_t *b, float left)
 {
-    return is_other_way(b, left) ? fabsf(left) * (1.0f / OTHER_WAY) : fabsf(left);
+    return spring_is_other_way(b, left) ? fabsf(left) * (1.0f / OTHER_WAY) : fabsf(left);
 }
 
 /* Noise that the average does not take away, as it is slower than a turn. Second differences, 4 s
@@ -263,7 +187,7 @@ static bool reads_hot(const spring_belief_t *b, const thermal_model_t *model, ui
 static bool is_tried(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
                      bool other_way, float share, float left, float noise2)
 {
-    const float start_c = lost_at_c(model, k, 0.0f);
+    const float start_c = spring_lost_at_c(model, k, 0.0f);
     const bool may_lose =
         spring_now_c(model, k) < start_c + SPRING_ESTIMATOR_LIKELY_SDS * spring_estimator_sd_k(b);
     const bool hot = !b->trial && reads_hot(b, model, k);
@@ -276,7 +200,7 @@ static bool is_tried(spring_estimator_t *e, spring_belief_t *b, thermal_model_t 
         warm(e, b, model, k, hotter_k);
     }
     b->run.line.trial_ohm = b->slow_ohm;
-    begin_line(b, true, share);
+    spring_begin_line(b, true, share);
     return true;
 }
 
@@ -291,17 +215,6 @@ static void take_crept(spring_belief_t *b, const thermal_model_t *model, uint8_t
         l->austenite_ohm *= by;
         l->martensite_ohm *= by;
     }
-}
-
-/* By how much its resistance has left its line; on trial, since that began, what does not go back.
- */
-static float has_left(const spring_belief_t *b)
-{
-    if (b->trial && is_other_way(b, b->slow_ohm - b->run.line.trial_ohm)) {
-        return b->slow_ohm / b->run.line.trial_ohm - 1.0f;
-    }
-    const spring_line_t *line = &b->run.line;
-    return b->slow_ohm / (line->ohm * (1.0f + line->rise_per_k * line->slow_k)) - 1.0f;
 }
 
 /* Surely austenite: how what it reads has gone with its way is its alloy's. */
@@ -333,13 +246,13 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
     line->slow_k += (line->way_k - line->slow_k) * share;
     if (line->ohm == 0.0f) {
         if (b->quiet == 0) {
-            average_anew(b);
+            spring_average_anew(b);
         }
         if (b->quiet < SPRING_ESTIMATOR_REST_TURNS) {
             b->losing = 0;
             return;
         }
-        begin_line(b, false, share);
+        spring_begin_line(b, false, share);
     } else if (b->quiet == 0 && b->offset_sd_v > OFFSET_LEAST_V && learn_offset(b)) {
         return;
     }
@@ -353,49 +266,41 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         return;
     }
     b->hot = reads_hot(b, model, k);
-    const float left = has_left(b);
+    const float left = spring_has_left(b);
     const float distance_k2 = spring_distance_k2(b);
     const float changed = as_lost(b, left);
     /* as its temperature may have moved unseen, so may the resistance */
     const float rise = line->rise_per_k;
-    const float least2 = fmaxf(LOSS_LEAST * LOSS_LEAST, rise * rise * distance_k2);
-    const float noise2 = slow_variance(b, share) + line->variance;
-    const float changed2 = changed * changed;
     /* that something has changed is known by then */
     const float sds = b->trial ? SPRING_ESTIMATOR_BOUND_SDS : SURE_SDS;
-    float sure2 = fmaxf(least2, sds * sds * noise2);
-    float suspected2 = SUSPECTED * SUSPECTED * sure2;
-    if (changed2 >= suspected2) { /* as a rule not: a division is saved */
-        const float moves2 = may_move_squared(b);
-        sure2 += moves2;
-        suspected2 += moves2;
-    }
-    if (changed2 < suspected2) {
-        b->losing = 0;
+    const spring_departure_t d =
+        spring_departs(b, model, k, changed * changed, rise * rise * distance_k2, sds, share);
+    const float noise2 = d.noise2;
+    const float least = d.least;
+    if (b->losing == 0) {
         const bool rests = b->quiet >= SPRING_ESTIMATOR_REST_TURNS;
         const bool away = b->averaged > ANCHOR_TURNS && fabsf(line->slow_k) > ANCHOR_K;
         if (b->rough && (rests || b->averaged == ANCHOR_TURNS || away)) {
             if (away) {
                 show_rise(e, b, model, k, noise2);
             }
-            begin_line(b, !rests, share); /* a coefficient explains only the way since */
+            spring_begin_line(b, !rests, share); /* a coefficient explains only the way since */
         }
         if (rests) {
-            follow(e, b, model, k, left, fmaxf(noise2, LOSS_LEAST * LOSS_LEAST));
+            follow(e, b, model, k, left, fmaxf(noise2, least * least));
         }
-        if (b->trial && is_other_way(b, left) && changed > LOSS_LEAST) {
-            begin_line(b, true, share); /* what creeps hides no loss from here */
+        if (b->trial && spring_is_other_way(b, left) && changed > least) {
+            spring_begin_line(b, true, share); /* what creeps hides no loss from here */
         }
         if (rests || b->trial) { /* its average is of where it was */
             const float moved_since_k = fminf(line->way_k - line->slow_k, 0.0f);
             spring_keep_above(e, b, model, k,
-                              lost_at_c(model, k, b->lost) - STILL_K + moved_since_k);
+                              spring_lost_at_c(model, k, b->lost) - STILL_K + moved_since_k);
         }
         return;
     }
-    b->losing = b->losing < UINT8_MAX ? (uint8_t)(b->losing + 1) : UINT8_MAX;
-    if (changed2 > sure2 || b->losing >= LASTING_TURNS) {
-        const bool other_way = is_other_way(b, left);
+    if (d.sure) {
+        const bool other_way = spring_is_other_way(b, left);
         if (is_tried(e, b, model, k, other_way, share, left, noise2)) {
             return;
         }
@@ -404,7 +309,7 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
             take_crept(b, model, k);
         }
         const float per_change = 1.0f / fabsf(b->learnt.change);
-        const float sd = sqrtf(may_move_squared(b)) / SPRING_ESTIMATOR_BOUND_SDS;
+        const float sd = d.unsure;
         if (is_misread(b, model, k, changed * per_change)) {
             spring_misread(e, model, k, left, sqrtf(noise2 + sd * sd));
             b->losing = 0;
@@ -413,6 +318,6 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         see_crossing(e, b, model, k, changed * per_change, sd * per_change);
         spring_note_read(e, k, left, sqrtf(noise2 + sd * sd));
         b->trial = false;
-        begin_line(b, true, share); /* the average still falls */
+        spring_begin_line(b, true, share); /* the average still falls */
     }
 }

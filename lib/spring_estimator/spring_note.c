@@ -38,8 +38,9 @@ static void fill(const spring_estimator_t *e, const thermal_model_t *model, uint
     const spring_before_t now = spring_before(&e->spring[k], model, k);
     const float more_w_per_k = now.loss_w_per_k - before->loss_w_per_k;
     if (sd_k > 0.0f) {
-        const int16_t start_c7 = thermal_model_transformation(model, k).martensite_start_c7;
-        sight->seen = deci_k((int16_t)(rounded(128.0f * seen_c) - start_c7));
+        const int16_t off_c7 =
+            (int16_t)(rounded(128.0f * seen_c) - thermal_model_temperature_c7(model, k));
+        sight->seen = deci_k((int16_t)(now.distance_c7 + off_c7));
         sight->seen_sd = rounded_sd(10.0f * sd_k);
     }
     sight->now = deci_k(now.distance_c7);

@@ -3,7 +3,13 @@
 #include "spring_estimator_internal.h"
 
 #define LEAST_READINGS 4
-#define LEAST_MEAN_MA  50u
+/* mV, for a mA and ohm, over steps of 4 mV; of a gain in Q16. */
+#define STEPS_PER_OHM_AND_GAIN (65536.0f / 4.0f)
+#define SENSOR_STEPS_MOST      100.0f
+#define GAIN_TOLERANCE         0.02f
+#define COARSE_MOST            13.0f /* 0.1 mV: of steps of 4 mV, 1 / pi */
+#define COVERED                0.32f /* 1 / pi: less of a step is as none */
+#define LEAST_MEAN_MA          50u
 /* 0.02 ohm: no spring, but a sensor's offset in one that gets nothing, or a short */
 #define LEAST_MA_PER_MV 50u
 #define SETTLING_TICKS  8
@@ -25,6 +31,21 @@ void spring_estimator_disturb(spring_estimator_t *e, uint8_t k)
     b->cut_short = true;
     b->current_sum_ma = b->voltage_sum_mv = 0;
     b->readings = 0;
+}
+
+/* Averaged over a sweep of voltages, evenly, what rounding to steps leaves has an amplitude of
+ * 1 / pi of a step, times sin(pi x) / (pi x), where the sweep covers x of a step and what is left
+ * of each of its own steps; the converter's noise leaves half of that. Two averages may differ by
+ * twice it. */
+void spring_estimator_sweep(spring_estimator_t *e, uint8_t k, uint16_t gain_q16, uint16_t sweep_ma)
+{
+    spring_belief_t *b = &e->spring[k];
+    const float sensor_steps =
+        fminf(STEPS_PER_OHM_AND_GAIN * b->ohm / (float)gain_q16, SENSOR_STEPS_MOST);
+    const float off = sensor_steps - (float)(uint8_t)(sensor_steps + 0.5f);
+    const float surely_off = fabsf(off) - GAIN_TOLERANCE * sensor_steps;
+    const float covers = surely_off * (float)gain_q16 * (float)sweep_ma * (1.0f / 65536.0f);
+    b->coarse = (uint8_t)(COARSE_MOST * COVERED / fmaxf(covers, COVERED)) & 15u;
 }
 
 void spring_jump(spring_belief_t *b, float by)

@@ -174,7 +174,8 @@ TEST(search_costs_a_declared_array_no_more_than_a_fiftieth)
 }
 
 /* A cloth on the display in mid-hold: what all springs lose falls to a third or to less than a
- * half, and it is lifted again. Each believed alone, they end between 130 and 330 degC. */
+ * half, and it is lifted again. Each believed alone, they end between 130 and 330 degC. One of the
+ * eight may not come back at once (4 to 8 % of them, over eight seeds of noise): that is said. */
 TEST(cloth_that_lies_on_the_display_is_noticed)
 {
     static const double left[] = {0.3, 0.45};
@@ -195,10 +196,40 @@ TEST(cloth_that_lies_on_the_display_is_noticed)
         const double lifted_c = run(300.0);
         here("%.1f, then %.1f degC", highest_c, lifted_c);
         TEST_ASSERT_TRUE(lifted_c < 130.0);
+        int away = 0;
         for (int k = 0; k < SPRINGS; k++) {
-            row((size_t)k);
-            TEST_ASSERT_TRUE(k == CENTRE || phase(k) > 0.9);
+            if (k != CENTRE && phase(k) <= 0.9) {
+                row((size_t)k);
+                TEST_ASSERT_TRUE(is_blind(k) && limited_by(k, DRIVE_POLICY_LIMIT_AWAY));
+                away++;
+            }
         }
+        TEST_ASSERT_LESS_OR_EQUAL(1, away);
+    }
+}
+
+/* A step of the duty moves the spring's voltage by as much as its sensor's, to a hundredth, so that
+ * the sweep averages no step away: taken for lost phase, springs were heated to 145 degC. */
+TEST(duty_steps_that_are_the_sensors_lose_no_phase)
+{
+    static const double circuits[][3] = {{5.4, 0.18, 0.26}, {5.0, 0.163, 0.26}, {5.0, 0.15, 0.248}};
+    plant_set_effect(plant, "supply_sag", true);
+    plant_set(plant, "supply_resistance_ohm", 0.05);
+    plant_set(plant, "freewheel_drop_v", 0.3);
+    plant_set(plant, "resistance_martensite_ohm", 0.179);
+    settings.current.freewheel_mv = 300;
+    options.bus_noise_v = 0.0007;
+    for (size_t n = 0; n < sizeof circuits / sizeof circuits[0]; n++) {
+        row(n);
+        plant_set(plant, "supply_v", circuits[n][0]);
+        plant_set(plant, "loop_resistance_ohm", circuits[n][1]);
+        plant_set(plant, "resistance_austenite_ohm", circuits[n][2]);
+        plant_reset(plant);
+        power_on();
+        for (int k = 0; k < SPRINGS; k++) {
+            want(k, 1000);
+        }
+        TEST_ASSERT_TRUE(run(700.0) < HOTTEST_C);
     }
 }
 

@@ -713,6 +713,60 @@ TEST(phase_is_lost_where_nothing_else_explains_what_is_read)
     }
 }
 
+/* Where a duty's step is a whole number of the sensor's, a sweep averages no step away: of 4 mV two
+ * averages may differ by 1.3. A gain is believed to 2 %. */
+TEST(steps_of_the_duty_that_are_the_sensors_are_a_bound_of_averages)
+{
+    static const struct {
+        double sensor_steps; /* of a step of the duty */
+        double duty_steps;   /* over which it sweeps */
+        double tenths;       /* of a mV */
+    } table[] = {
+        {1.0, 20.0, 13.0},        {2.0, 20.0, 13.0},  {1.019, 20.0, 13.0}, {1.06, 5.0, 13.0},
+        {1.06, 20.0, 5.3},        {0.94, 20.0, 5.05}, {0.9, 20.0, 2.54},   {1.2, 20.0, 1.18},
+        {0.5, 20.0, 0.42},        {0.2, 100.0, 0.21}, {2.06, 20.0, 11.06}, {200.0, 20.0, 13.0},
+        {1.06, 20.0 / 3.0, 13.0},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_cold();
+        row(n);
+        INSIDE.ohm = 0.25f;
+        const double gain = 0.25 / 4.0 / table[n].sensor_steps; /* duty steps per mA */
+        const uint16_t gain_q16 = (uint16_t)lround(gain * 65536.0);
+        spring_estimator_sweep(&estimator, 0, gain_q16,
+                               (uint16_t)lround(table[n].duty_steps / gain));
+        TEST_ASSERT_UINT8_WITHIN(table[n].tenths < 12.0 ? 1 : 0, (uint8_t)table[n].tenths,
+                                 INSIDE.coarse);
+    }
+}
+
+/* What they may make lasts: nothing is suspected below it. */
+TEST(what_steps_may_make_is_no_lost_phase_however_long)
+{
+    static const struct {
+        double less;
+        uint8_t coarse, losing;
+        bool lost;
+        uint8_t losing_then;
+    } table[] = {
+        {0.00515, 13, 59, false, 0}, /* 1.3 mV of 0.25 V */
+        {0.00525, 13, 0, true, 0},   {0.00235, 6, 0, false, 0},
+        {0.00245, 6, 59, true, 0},   {0.00118, 2, 0, false, 1}, /* below the least */
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_line_at(0.25 * (1.0 - table[n].less));
+        row(n);
+        INSIDE.learnt.slow_noise = 0.0f;
+        INSIDE.slow_a = (float)(1.0 / (1.0 - table[n].less)); /* so the line's 0.25 V are read */
+        INSIDE.run.line.a = INSIDE.slow_a;
+        INSIDE.coarse = table[n].coarse & 15u;
+        INSIDE.losing = table[n].losing;
+        spring_holding_watch(&estimator, &INSIDE, &model, 0, 0.0f, 0.0625f);
+        TEST_ASSERT_EQUAL(table[n].lost, INSIDE.lost > 0.0f);
+        TEST_ASSERT_EQUAL_UINT8(table[n].losing_then, INSIDE.losing);
+    }
+}
+
 /* A sight of lost phase: what was moved stays in doubt, and as a disturbance where the distance was
  * known to 3 K; beyond 2 sd it opens a step. Too far off, it is the sensor's. */
 TEST(lost_phase_is_doubted_and_too_much_of_it_is_the_sensors)
@@ -1009,11 +1063,13 @@ TEST(drop_of_the_current_tells_the_offset)
         double line_a, current_a, way_k, offset_v, more_ohm;
         uint8_t quiet;
         bool told;
+        uint8_t coarse;
     } table[] = {
-        {3.0, 1.1, 0.0, 0.0, 0.002, 0, true},    {3.0, 1.1, 2.0, 0.001, -0.002, 0, true},
-        {3.0, 1.1, -2.9, 0.0, 0.002, 0, true},   {3.0, 1.1, -3.2, 0.0, 0.002, 0, false},
-        {3.0, 1.3, 0.0, 0.0, 0.002, 0, false},   {3.0, 1.1, 0.0, 0.0, 0.002, 1, false},
-        {3.0, 1.1, 0.0, 0.009, 0.002, 0, false}, {3.0, 1.1, 0.0, -0.009, -0.002, 0, false},
+        {3.0, 1.1, 0.0, 0.0, 0.002, 0, true, 4},    {3.0, 1.1, 0.0, 0.0, 0.002, 0, true, 13},
+        {3.0, 1.1, 0.0, 0.0, 0.002, 0, true, 0},    {3.0, 1.1, 2.0, 0.001, -0.002, 0, true, 0},
+        {3.0, 1.1, -2.9, 0.0, 0.002, 0, true, 0},   {3.0, 1.1, -3.2, 0.0, 0.002, 0, false, 0},
+        {3.0, 1.3, 0.0, 0.0, 0.002, 0, false, 0},   {3.0, 1.1, 0.0, 0.0, 0.002, 1, false, 0},
+        {3.0, 1.1, 0.0, 0.009, 0.002, 0, false, 0}, {3.0, 1.1, 0.0, -0.009, -0.002, 0, false, 0},
     };
     for (size_t n = 0; n < ROWS(table); n++) {
         begin_line_at(0.25);
@@ -1028,10 +1084,11 @@ TEST(drop_of_the_current_tells_the_offset)
         INSIDE.averaged = 3;
         INSIDE.quiet = table[n].quiet;
         INSIDE.noise = 1e-3f;
+        INSIDE.coarse = table[n].coarse & 15u;
         const double product = table[n].line_a * table[n].current_a;
         const double apart_a = product / (table[n].line_a - table[n].current_a);
         const double moved_k = table[n].way_k + (table[n].quiet ? 0.0 : 0.1);
-        const double read_v2 = pow(0.0005, 2) +
+        const double read_v2 = pow(fmax(0.0005, 1e-4 * table[n].coarse), 2) +
                                pow(1e-3 * (0.25 + table[n].more_ohm) * apart_a, 2) +
                                pow(0.0015 * moved_k * 0.25 * apart_a, 2);
         const double gain = 25e-6 / (25e-6 + read_v2);
