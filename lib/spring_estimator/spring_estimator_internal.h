@@ -95,6 +95,10 @@ float spring_above_ambient_k(const thermal_model_t *model, uint8_t spring);
  * (SPRING_PHASE_MARTENSITE or _AUSTENITE). */
 void spring_set_temperature(thermal_model_t *model, uint8_t spring, float temperature_c,
                             uint8_t from);
+/* Where it is as it has come to a phase, 0..1, by being heated: within 0.03 of a cosine's phase. */
+float spring_heated_at_c(const thermal_model_t *model, uint8_t spring, float phase);
+/* The model's phase, 0..1, where it is. */
+void spring_set_phase(thermal_model_t *model, uint8_t spring, float phase);
 /* What the model declares it to give off there, beside its neighbours as they are. */
 float spring_declared_w(const thermal_model_t *model, uint8_t spring, float temperature_c);
 /* Variance of the distance. */
@@ -229,5 +233,9 @@ void spring_heating_watch(spring_estimator_t *estimator, spring_belief_t *belief
  * in the average is that of its readings. */
 void spring_holding_watch(spring_estimator_t *estimator, spring_belief_t *belief,
                           thermal_model_t *model, uint8_t spring, float moved_k, float share);
+/* The same between the phases, on its way to a level or held there: what it gains or loses tells on
+ * which branch of its hysteresis it is. */
+void spring_level_watch(spring_estimator_t *estimator, spring_belief_t *belief,
+                        thermal_model_t *model, uint8_t spring, float moved_k, float share);
 
 #endif

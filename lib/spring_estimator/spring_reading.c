@@ -81,8 +81,8 @@ static bool leave_out(spring_estimator_t *e, const thermal_model_t *model, uint8
     spring_belief_t *b = &e->spring[k];
     const float was_ohm = b->slow_ohm;
     const float step = ohm - was_ohm;
-    if (b->heating || b->run.line.ohm <= 0.0f || fabsf(step) <= JUMP_OF_HOLD * was_ohm ||
-        b->fresh == 0) {
+    if (b->heating || b->possible != SPRING_PHASE_AUSTENITE || b->run.line.ohm <= 0.0f ||
+        fabsf(step) <= JUMP_OF_HOLD * was_ohm || b->fresh == 0) {
         b->odd = false;
         return false;
     }
