@@ -32,8 +32,9 @@ void console_print_setting(const console_t *console, uint16_t index, uint8_t ele
     console_out_end(console, &out);
 }
 
-static void add_loaded(text_line_t *line, const console_status_t *status)
+static void add_loaded(text_line_t *line, const console_t *console)
 {
+    const console_status_t *const status = console->status;
     /* as record_found_t has them */
     static const char texts[] FLASH_MEMORY = "loaded\0"
                                              "loaded; the other copy is damaged or was cut short\0"
@@ -41,6 +42,10 @@ static void add_loaded(text_line_t *line, const console_status_t *status)
                                              "stored ones damaged, defaults\0"
                                              "stored by another version, defaults";
     const settings_loaded_t *const loaded = &status->loaded;
+    if (record_store_step(&console->store->record) == RECORD_SAVE_DONE) {
+        text_add_flash(line, FLASH_TEXT("saved")); /* since, whatever the boot found */
+        return;
+    }
     if (status->settings_conflict_at_boot) {
         text_add_flash(line, FLASH_TEXT("stored ones do not fit together, defaults are active"));
         return;
@@ -74,7 +79,7 @@ bool console_version_line(const console_t *console, console_out_t *out)
         text_add_flash(line, FLASH_TEXT("reset "));
         text_add_flash(line, status->reset_cause);
         text_add_flash(line, FLASH_TEXT("; settings "));
-        add_loaded(line, status);
+        add_loaded(line, console);
         return true;
     case 2: {
         const int32_t values[] = {status->ticks_late, status->tick_longest_us, status->load_percent,

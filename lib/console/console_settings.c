@@ -172,16 +172,27 @@ console_error_t console_assign(console_t *console, const char *name, const char 
         console_hint_text(console, FLASH_TEXT("a decimal point, no comma"), 0, 0);
         return CONSOLE_ERROR_BAD_ARGUMENT;
     }
+    uint16_t row;
+    uint8_t element;
+    if (result == SETTINGS_NOT_A_NUMBER && strchr(value, '.') != NULL &&
+        settings_find(name, &row, &element)) {
+        console_hint_text(console, FLASH_TEXT("a number with at most #0 decimals"),
+                          parameter_row(row).decimals, 0);
+        return CONSOLE_ERROR_BAD_ARGUMENT;
+    }
     const console_error_t error = error_of(result);
     return error == CONSOLE_OK ? error : refuse(console, name, error);
 }
 
-/* Another size begins everything anew, what is driven as well: as it was, then. */
+/* Another size begins everything anew, what is driven as well; and a relay that is no more declared
+ * opens, by which what is driven gets nothing: as it was, then. */
 static bool may_take(console_t *console, const settings_t *before)
 {
-    const thermal_model_parameters_t *const was = &before->controller.model;
-    const thermal_model_parameters_t *const is = &console->settings->controller.model;
-    if ((was->rows == is->rows && was->columns == is->columns) || !console_any_spring_on(console)) {
+    const controller_settings_t *const was = &before->controller;
+    const controller_settings_t *const is = &console->settings->controller;
+    if ((was->model.rows == is->model.rows && was->model.columns == is->model.columns &&
+         was->safety.cut_off == is->safety.cut_off) ||
+        !console_any_spring_on(console)) {
         return true;
     }
     console_open_settings(console);

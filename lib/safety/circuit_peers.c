@@ -128,7 +128,7 @@ static void learn(circuit_peer_t *own, float beside, float told)
 
 /* What its share beside that of the others is off, of so many volts that told it. An offset keeps
  * its sign: of what it shows now and what it was learnt by, the one at fewer volts tells. */
-static float odd_mv(const circuit_peer_t *own, float own_part, float share, float others,
+static float odd_mv(const circuit_peer_t *own, float changed, float share, float others,
                     float told_mv)
 {
     const float off_mv = beyond(share, others, OTHER_PART) * told_mv;
@@ -136,8 +136,7 @@ static float odd_mv(const circuit_peer_t *own, float own_part, float share, floa
         return off_mv;
     }
     const float learnt_mv = VOLTS_MV * (float)own->volts / (float)own->learnt;
-    const float known_mv =
-        beyond(share, others * own_part, KNOWN_PART) * (learnt_mv < told_mv ? learnt_mv : told_mv);
+    const float known_mv = changed * (learnt_mv < told_mv ? learnt_mv : told_mv);
     return known_mv > off_mv ? known_mv : off_mv;
 }
 
@@ -145,13 +144,6 @@ static float odd_mv(const circuit_peer_t *own, float own_part, float share, floa
 static bool was_found(const circuit_peer_t *own)
 {
     return own->odd + (own->agreed == 0 ? 1u : 0u) >= CIRCUIT_PEERS_WINDOWS;
-}
-
-/* Within what a cable makes of it, whatever offsets make: else a window of few volts, which tells
- * little, would acquit one who was found. */
-static bool is_like(const circuit_peer_t *own, float own_part, float share, float others)
-{
-    return own->learnt == 0 || beyond(share, others * own_part, KNOWN_PART) <= 0.0f;
 }
 
 /* Of two voltages, what one is more, of the larger one. */
@@ -219,18 +211,23 @@ static verdict_t beside(circuit_peer_t *own, float own_part, const others_t *oth
     const bool is_less = expected_mv < others->mv;
     const float told_mv = is_less ? expected_mv : others->mv;
     const float higher_mv = is_less ? others->mv : expected_mv;
-    const float off_mv = odd_mv(own, own_part, share, others->share, told_mv) - offsets_mv;
+    const float like = others->share * own_part;           /* as ever, */
+    const float changed = beyond(share, like, KNOWN_PART); /* beyond what a cable makes of it */
+    const float off_mv = odd_mv(own, changed, share, others->share, told_mv) - offsets_mv;
     verdict_t is = {.good = off_mv <= 0.0f,
-                    .acquits = own->learnt != 0 && offsets_mv <= ALONE_LESS_PART * told_mv};
-    is.odd = !is.good && off_mv > unsure_mv(source, share < others->share * own_part, is_less) *
-                                      apart(expected_mv, others->mv);
+                    .acquits =
+                        own->learnt != 0 && changed <= (ALONE_LESS_PART - KNOWN_PART) * like};
+    is.odd = !is.good &&
+             off_mv > unsure_mv(source, share < like, is_less) * apart(expected_mv, others->mv);
     /* Where offsets make more than what a share may be at the most, it teaches nothing; nor where a
      * drop may that is not known: of the little that is found behind one, what an eighth more of
      * duty brings is most. */
     const float most_mv = fminf(others->share, 1.0f) * (OTHER_PART * told_mv - offsets_mv);
     is.teaches = others->alike ? source->unsure_mv * (higher_mv - told_mv) <= most_mv * higher_mv
                                : source->unsure_mv <= most_mv;
-    is.good = is.good && (!was_found(own) || is_like(own, own_part, share, others->share));
+    /* whatever offsets make: else a window of few volts, which tells little, would acquit one who
+     * was found */
+    is.good = is.good && (!was_found(own) || own->learnt == 0 || changed <= 0.0f);
     if (is.odd || (!is.good && was_found(own)) || own->learnt >= LEARN_MOST || !is.teaches) {
         return is;
     }

@@ -77,6 +77,21 @@ TEST(each_fault_is_of_its_spring_and_its_neighbours_go_on)
     only(*mega, 4, SAFETY_FAULT_SENSOR_MISMATCH);
 }
 
+/* No current and no voltage: of a wire ahead of the sensor, too. Fault 2 names both. */
+TEST(a_sensor_that_hung_at_none_is_said_with_the_broken_wire_that_it_looks_like)
+{
+    rig mega;
+    mega.boot_niti({"policy precompensate", "on 1"});
+    board_set_fault(mega.raw(), BOARD_FAULT_FREEZE, 4, true);
+    mega.run_ms(1000.0);
+    mega.expect_ok("on 5");
+    mega.run_ms(1500.0);
+    const board_view_t seen = mega.view();
+    TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_OPEN_SPRING, seen.spring[4].fault);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, board_duty(mega.raw(), 4));
+    TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, seen.spring[0].fault);
+}
+
 double shown_a(rig &mega, unsigned k)
 {
     return 1e-4 * static_cast<std::int16_t>(board_sensor_register(mega.raw(), k, 1));

@@ -34,6 +34,7 @@ from ninespring.io.logs import read_log, read_table
 from ninespring.io.port import Port
 from ninespring.io.recording import RowCheck
 from ninespring.io.thermometers import Lines
+from ninespring.io.words import FAULTS
 from ninespring.say.monitoring import Screen
 from rich.console import Console
 
@@ -314,7 +315,7 @@ def test_a_fault_is_said_as_it_comes_in_the_log_and_at_the_end(tmp_path: Path) -
     board = FakeBoard(stream=[*STREAM[:6], *comes], every_s=0.01)
     done = record(board, tmp_path, "--duration", 5, "--json", tmp_path / "r.json")
     assert done.returncode == 1
-    words = "at 3.5 s: spring 1: fault 2 open_circuit (driven and no current: a broken spring or wire)"
+    words = f"at 3.5 s: spring 1: fault 2 open_circuit ({FAULTS[2]})"
     assert done.stderr.splitlines()[0] == f"fault {words}"
     assert done.stderr.splitlines()[-1].startswith(f"ninespring: a fault cut this run short, {words}; what came is in")
     result = json.loads((tmp_path / "r.json").read_text())

@@ -281,6 +281,20 @@ TEST(another_size_is_refused_while_a_spring_is_driven)
     }
 }
 
+/* It would open under what is driven, and each spring would be said to be broken. */
+TEST(relay_is_declared_away_only_while_no_spring_is_driven)
+{
+    expect_ok("unlock");
+    expect_ok("on 1");
+    expect_error("$cut_off=0", CONSOLE_ERROR_SPRINGS_ON);
+    expect_ok("$cut_off=1"); /* what it is */
+    TEST_ASSERT_TRUE(controller_supply_is_fitted(&controller));
+    TEST_ASSERT_EQUAL_UINT16(1000, controller_level_permille(&controller, 0));
+    expect_ok("off all");
+    expect_ok("$cut_off=0");
+    TEST_ASSERT_FALSE(controller_supply_is_fitted(&controller));
+}
+
 /* Every word, and every way to write it wrong; settings, too: its number, and its cure. */
 TEST(every_refusal_says_what_would_be_right)
 {
@@ -352,6 +366,8 @@ TEST(every_refusal_says_what_would_be_right)
         {5, "$dither_a=0.199", ": dither_a is 0.200 to 0.400 A\r\n"},
         {5, "$over_current_a=3.151",
          ": over_current_a is 0.100 to 3.150 A, for what docs/safety.md promises\r\n"},
+        {4, "$supply_v=5.0001",
+         "an argument is not of the right form: a number with at most 3 decimals\r\n"},
         {4, "$supply_v=5V", ": supply_v is 1.000 to 16.000 V\r\n"},
         {4, "$supply_v=", ": supply_v is 1.000 to 16.000 V\r\n"},
         {5, "$loss_scale_9=0", ": loss_scale_9 is 0.001 to 8.000\r\n"},
@@ -558,6 +574,17 @@ TEST(version_says_what_became_of_the_stored_settings)
         ask("version");
         expect_said(cases[k].text);
     }
+}
+
+TEST(version_says_that_settings_were_saved_since_the_boot_found_none)
+{
+    status.loaded = (settings_loaded_t){.found = RECORD_EMPTY, .missing = PARAMETER_COUNT};
+    expect_ok("$save");
+    ask("version");
+    expect_said("settings saved\r");
+    expect_ok("$supply_v=5.2"); /* what is active is another matter */
+    ask("version");
+    expect_said("settings saved\r");
 }
 
 /* Nine springs take longer than a program may be silent. */

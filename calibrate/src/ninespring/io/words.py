@@ -12,7 +12,7 @@ SIGHT = re.compile(r"<sight\|spring:(\d+)\|t:[\d.]+\|[a-z_]+(?:\|[a-z_]+(?::-?[\
 
 FAULTS = {
     1: "current above over_current_a",
-    2: "driven and no current: a broken spring or wire",
+    2: "driven and no current: a broken spring or wire; or a sensor that hung while it was off; or no supply",
     3: "resistance below resistance_minimum_ohm",
     4: "resistance above resistance_maximum_ohm: a bad contact",
     5: "the current sensor does not acknowledge",
