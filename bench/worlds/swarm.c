@@ -608,6 +608,26 @@ static void levels(draw_t *draw)
     }
 }
 
+/* Of a user who asks for nothing else, of springs that were never fully on since power-on. */
+static void first_level(draw_t *draw)
+{
+    run_case_t *run = draw->run;
+    if (run->commands != 0 || run->reset_gap_s > 0.0) {
+        return;
+    }
+    run_command_t *const level = &run->command[run->commands++];
+    run_command_t *const fully = &run->command[run->commands++];
+    memcpy(level->on, run->on, sizeof level->on);
+    memcpy(fully->on, run->on, sizeof fully->on);
+    fully->time_s = uniform(draw, 60.0, 400.0);
+    const double level_permille = uniform(draw, 150.0, 900.0);
+    for (int k = 0; k < count(draw); k++) {
+        level->level_permille[k] = run->on[k] ? (uint16_t)level_permille : 0;
+    }
+    draw->swarm->levels = draw->swarm->steps = true;
+    say(draw, "at first %.0f %%, fully at %.0f s", 0.1 * level_permille, fully->time_s);
+}
+
 typedef struct {
     double probability;
     void (*draw)(draw_t *draw);
@@ -653,6 +673,7 @@ static const disturbance_t drawn[] = {
     {0.04, reset, "power off and on"},
     {0.40, diodes, "diodes that drop 0.30 to 0.45 V, declared within 0.05 V or, half of them, not"},
     {0.20, levels, "a user of levels: 15 to 90 %, fully, off, of some or all"},
+    {0.10, first_level, "or only a level of all at first, then fully"},
 };
 #define DECLARED ((int)(sizeof declared / sizeof declared[0]))
 #define DRAWN    ((int)(sizeof drawn / sizeof drawn[0]))

@@ -491,7 +491,7 @@ TEST(every_disturbance_is_drawn_as_often_as_is_said)
 TEST(a_user_of_levels_asks_for_some_after_the_other_patterns_and_the_reset)
 {
     static swarm_case_t swarm;
-    int users = 0, between = 0;
+    int users = 0, between = 0, firsts = 0;
     for (int i = 0; i < 500; i++) {
         swarm_draw(4, i, 900.0, &swarm);
         const run_case_t *run = &swarm.run;
@@ -501,16 +501,27 @@ TEST(a_user_of_levels_asks_for_some_after_the_other_patterns_and_the_reset)
             for (int k = 0; k < WORLD_SPRINGS_MAX; k++) {
                 const int permille = run->command[n].level_permille[k];
                 TEST_ASSERT_TRUE(permille == 0 || (permille >= 150 && permille < 900));
-                TEST_ASSERT_TRUE(permille == 0 ||
-                                 (swarm.levels && run->command[n].time_s > run->reset_s));
+                TEST_ASSERT_TRUE(
+                    permille == 0 ||
+                    (swarm.levels && (n == 0 || run->command[n].time_s > run->reset_s)));
                 any = any || permille != 0;
             }
         }
         TEST_ASSERT_TRUE(run->commands <= RUN_COMMANDS_MAX);
-        users += swarm.levels;
-        between += any;
+        const bool first = run->commands == 2 && run->command[0].time_s == 0.0;
+        if (first) { /* the same of all, of which then all is asked */
+            TEST_ASSERT_TRUE(run->command[1].time_s >= 60.0 && run->command[1].time_s < 400.0);
+            for (int k = 0; k < WORLD_SPRINGS_MAX; k++) {
+                TEST_ASSERT_EQUAL(run->command[0].on[k], run->command[1].on[k]);
+                TEST_ASSERT_EQUAL_UINT16(0, run->command[1].level_permille[k]);
+            }
+        }
+        users += swarm.levels && !first;
+        firsts += first;
+        between += any && !first;
     }
     TEST_ASSERT_INT_WITHIN(30, 100, users);
+    TEST_ASSERT_INT_WITHIN(18, 35, firsts);
     TEST_ASSERT_TRUE(between > users / 2 && between <= users);
 }
 
