@@ -472,6 +472,20 @@ def test_a_declared_number_that_a_part_hardly_shows_stays_as_all_had_it() -> Non
     )
 
 
+def test_the_number_of_a_run_that_is_left_out_is_none_of_those_that_stay() -> None:
+    """Of three runs the third is the second of those that stay: the left-out one's room says nothing of its."""
+    of_all, of_part = (
+        SimpleNamespace(
+            spec=Spec((), (), tuple(Free(f"ambient_c@{r + 1}", 20.0, 0.0, 40.0, "degC", run=r) for r in runs), ()),
+            jacobian=np.sqrt(np.diag(information)),
+        )
+        for runs, information in (((0, 1, 2), (50.0, 100.0, 5.0)), ((0, 1), (50.0, 5.0)))
+    )
+    assert _hardly_shown(of_all, of_part, [0, 2]) == []  # type: ignore[arg-type]
+    of_part.jacobian = np.sqrt(np.diag((50.0, 0.4)))
+    assert _hardly_shown(of_all, of_part, [0, 2]) == ["ambient_c@2"]  # type: ignore[arg-type]
+
+
 def heaters(
     room_c: float, seed: int, warm_k: float = 0.0, later_k: float = 0.0, late_s: float = 25.0, bent: float = 0.02
 ) -> Run:

@@ -99,8 +99,8 @@ def _problem(whole: Problem, runs: Sequence[Run], kept: Sequence[int]) -> Proble
 
 
 def _own(free: Free, kept: Sequence[int]) -> str:
-    """Return the key that a number has where only these runs are fitted."""
-    if free.run is None or free.run not in kept:
+    """Return the key that a number of all runs, or of one of these, has where only these are fitted."""
+    if free.run is None:
         return free.key
     return free.key.replace(f"@{free.run + 1}", f"@{kept.index(free.run) + 1}")
 
@@ -123,7 +123,7 @@ def _hardly_shown(whole: Fit, part: Fit, kept: Sequence[int]) -> list[str]:
     return [
         _own(f, kept)
         for f, all_of_it in mine
-        if f.effect is None and _own(f, kept) in told and told[_own(f, kept)] < HARDLY * all_of_it
+        if f.effect is None and (f.run is None or f.run in kept) and told[_own(f, kept)] < HARDLY * all_of_it
     ]
 
 
