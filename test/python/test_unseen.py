@@ -157,10 +157,9 @@ def test_a_lag_that_foretells_better_is_in_the_model_and_a_name_only_where_it_ex
     search = SimpleNamespace(base=told.base, refit=lambda *_: told.lagged, worth=lambda *_: worth, reduced=without)
     monkeypatch.setattr(diagnosis.search, "Search", lambda *_: search)
     monkeypatch.setattr(diagnosis, "_finish", lambda problem, fit: fit)
-    case: Any = SimpleNamespace(
-        final=told.base, declared=told.base, search=SimpleNamespace(candidates=[]), instead=False
-    )
-    case.hidden, case.adopted, case.progress = [], [], None
+    began = SimpleNamespace(candidates=[], progress=None)
+    case: Any = SimpleNamespace(final=told.base, declared=told.base, search=began, instead=False)
+    case.hidden, case.adopted = [], []
     case.problem = SimpleNamespace(colour=None, take_for=lambda colour: None)
     headline = diagnosis._foretold(case, search, told)  # type: ignore[arg-type]
     assert headline is not None and headline.rmse_c == (0.7 if unjudged else 0.8)
@@ -308,12 +307,10 @@ def test_by_least_squares_everything_is_fitted_so_again() -> None:
     likelihood(problem, base)
     problem.take_for(base.colour)
     lasting = problem.fit(base.spec, base.as_dict(), errors=True)
-    case: Any = SimpleNamespace(
-        problem=problem, declared=base, base=lasting, final=lasting, contenders=[("a", lasting)]
-    )
-    case.search, case.progress, case.adopted = SimpleNamespace(candidates=[]), lambda text: None, []
+    case: Any = SimpleNamespace(problem=problem, declared=base, final=lasting, contenders=[("a", lasting)])
+    case.search, case.adopted = SimpleNamespace(candidates=[], progress=lambda text: None), []
     judge = diagnosis._by_least_squares(case)
-    assert problem.colour is None and case.search is judge and case.base is base
+    assert problem.colour is None and case.search is judge and judge.base is base
     for fit in (case.final, case.contenders[0][1]):
         assert fit.sse < lasting.sse and fit.sse == pytest.approx(base.sse, rel=1e-4)
 

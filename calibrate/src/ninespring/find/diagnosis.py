@@ -42,7 +42,7 @@ from . import (
     unnamed,
     unseen,
 )
-from .certainty import CERTAIN, NAMED, Witness, witness
+from .certainty import CERTAIN, NAMED, PROBABLE, Witness, witness
 from .evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
 from .residual import depends_on
 
@@ -52,8 +52,6 @@ MOST_OF_IT = 0.5
 """Part of what is beyond the noise without an effect that it explains, where more is explained than left."""
 LEAST_PART = 0.01
 """Of a drive or a reading, less is not told as a cause: a board measures power no better, its voltages step by 4 mV."""
-PROBABLE = CERTAIN - 0.01
-"""The most that an effect is sure with a number at its bound."""
 
 
 @dataclass
@@ -288,27 +286,25 @@ def candidates_of(found: search.Search, final: Fit, base: Fit) -> list[results.C
     return sorted(candidates, key=lambda one: -one.evidence_over_baseline)
 
 
-@dataclass
+@dataclass(kw_only=True)
 class _Case:
     """A diagnosis under way: what was found so far."""
 
     problem: Problem
-    progress: Callable[[str], None]
     search: search.Search
+    """What found it, beside its base: what is declared, with what lasts taken for noise where something is left."""
     declared: Fit
     """The declared model alone."""
-    base: Fit
-    """What the effects are found beside: that, with what lasts taken for noise where something is left."""
     final: Fit
     without: dict[str, Fit]
     """The final fit without each effect that it has found."""
-    contenders: list[tuple[str, Fit]]
-    swapped: list[str]
+    contenders: list[tuple[str, Fit]] = field(default_factory=list)
+    swapped: list[str] = field(default_factory=list)
     """Columns that are, in words."""
-    hidden: list[unnamed.Hidden]
-    fits: Mapping[Any, Fit]
+    hidden: list[unnamed.Hidden] = field(default_factory=list)
+    fits: Mapping[Any, Fit] = field(default_factory=dict)
     """By least squares, of the first search."""
-    first: Fit | None
+    first: Fit | None = None
     """What that found, where only what is alike was looked for and something is left."""
     loose: list[loose.Loose] = field(default_factory=list)
     """Thermometers that were for a while, none of whose readings count then."""
@@ -324,7 +320,7 @@ class _Case:
     @property
     def adopted(self) -> list[str]:
         """Effects that were found."""
-        return [e for e in self.final.spec.effects if e not in self.base.spec.effects]
+        return [e for e in self.final.spec.effects if e not in self.declared.spec.effects]
 
 
 _Account = tuple[_Case, search.Search, unseen.Unseen]
@@ -341,9 +337,9 @@ def _diagnose(
     headline = _foretold(case, judge, judged_by)
     left_over = unexplained(problem, case.final) or bool(case.hidden)
     strength = {e: log_evidence(problem, case.final, case.without[e]) for e in case.adopted}
-    steps = in_order(case.search, case.base, case.final, case.adopted)
+    steps = in_order(case.search, case.search.base, case.final, case.adopted)
     rivals = rivals_of(case.search, case.final, [effect for effect, _ in steps], case.contenders, progress)
-    tried = candidates_of(case.search, case.final, case.base)
+    tried = candidates_of(case.search, case.final, case.search.base)
     if case.hidden:
         steps = _with_what_has_no_name(case, steps)
     listed, differ = _listed(case, steps, strength)
@@ -352,7 +348,12 @@ def _diagnose(
     given, after = _the_given(case, judged_by)
     # what is told of the logs, and of what is left of them, is told by the model that is given
     shown = given if case.instead else case.final
-    baseline = _baseline(case)
+    # what is declared, by itself: by least squares, as anybody fits it
+    baseline = results.Baseline(
+        noise_c=problem.noise_c,
+        effects=list(case.declared.spec.effects),
+        **msgspec.structs.asdict(_after(problem, case.declared)),
+    )
     progress("what v / i says")
     second = None if case.swapped else resistance.witness(problem, shown)
     impossible = doubt.impossible(second)
@@ -459,7 +460,9 @@ def _rested(plain: _Case, prepared: Callable[[], Problem]) -> _Account | None:
     if RUN_AMBIENT in plain.adopted and alloys & set(plain.adopted):
         return None
     problem = prepared()
-    first = search.Search(problem, plain.search.candidates, first_fit(problem, plain.declared.spec), plain.progress)
+    first = search.Search(
+        problem, plain.search.candidates, first_fit(problem, plain.declared.spec), plain.search.progress
+    )
     judged_by = unseen.Unseen(problem, first, first.base)
     searched = rested.search_rested(first, judged_by)
     if searched is None:
@@ -467,19 +470,13 @@ def _rested(plain: _Case, prepared: Callable[[], Problem]) -> _Account | None:
     found, final, without = searched
     final = _finish(problem, final)
     case = _Case(
-        problem,
-        plain.progress,
-        found,
-        first.base,
-        found.base,
-        final,
-        without,
-        [],
-        plain.swapped,
-        [],
-        {},
-        None,
-        plain.loose,
+        problem=problem,
+        search=found,
+        declared=first.base,
+        final=final,
+        without=without,
+        swapped=plain.swapped,
+        loose=plain.loose,
     )
     case.witnesses = {effect: witness(problem, final, effect, other, False) for effect, other in without.items()}
     return case, found, judged_by
@@ -581,7 +578,16 @@ def _searched(begun: _Begun, alike: bool) -> _Case:
     progress("held-out blocks")
     final = _finish(problem, final)
     return _Case(
-        problem, progress, found, base, found.base, final, without, contenders, swapped, hidden, begun.fits, first
+        problem=problem,
+        search=found,
+        declared=base,
+        final=final,
+        without=without,
+        contenders=contenders,
+        swapped=swapped,
+        hidden=hidden,
+        fits=begun.fits,
+        first=first,
     )
 
 
@@ -621,7 +627,7 @@ def _judged(case: _Case, judged_by: unseen.Unseen) -> search.Search:
             final = judge.reduced(final, effect)
         # another may be what it stood in for
         others = [one for one in judge.candidates if one.effect not in doubtful]
-        judge = search.Search(problem, others, case.base, case.progress, case.search.fits)
+        judge = search.Search(problem, others, case.search.base, case.search.progress, case.search.fits)
         final, case.without, case.contenders = judge.settle(judge.forward(final))
         case.final = _finish(problem, final)
     return judge
@@ -641,14 +647,13 @@ def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> re
     if kept is None:
         # as anybody fits it, by least squares: nothing that is known of its errors predicts better
         problem.take_for(None)
-        case.base = case.declared
-        case.search = judge = search.Search(problem, case.search.candidates, case.base, case.progress)
+        case.search = judge = search.Search(problem, case.search.candidates, case.declared, case.search.progress)
         kept, case.contenders = judged_by.refitted(judge, judged_by.plain), []
         why = "nothing else that was tried predicts as well"
         # a lag that foretells better is in the model; a name it is where it explains what a name must
-        named = kept is case.base or judge.worth(kept, case.base)
+        named = kept is case.declared or judge.worth(kept, case.declared)
         case.instead = not named or judged_by.instead is not judged_by.plain
-        kept = kept if named else case.base
+        kept = kept if named else case.declared
     if case.not_kept or why:
         case.final = _finish(problem, kept)
         case.without = {effect: judge.reduced(case.final, effect) for effect in case.adopted}
@@ -670,8 +675,7 @@ def _by_least_squares(case: _Case) -> search.Search:
     """
     problem = case.problem
     problem.take_for(None)
-    case.base = case.declared
-    case.search = search.Search(problem, case.search.candidates, case.base, case.progress)
+    case.search = search.Search(problem, case.search.candidates, case.declared, case.search.progress)
     fits = [case.final, *(fit for _, fit in case.contenders)]
     final, *others = [problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3) for fit in fits]
     case.contenders = [(effect, fit) for (effect, _), fit in zip(case.contenders, others, strict=True)]
@@ -692,8 +696,7 @@ def _given(case: _Case, judged_by: unseen.Unseen, fit: Fit) -> results.Unseen | 
 def _with_what_has_no_name(case: _Case, steps: list[tuple[str, Fit]]) -> list[tuple[str, Fit]]:
     """Return the steps with everything in the error again: a model is for an array in which what has no name still acts."""
     case.problem.leave_out(None)
-    case.base = case.declared
-    again = {id(fit): with_everything(case.problem, fit, case.base) for fit in [case.final, *(fit for _, fit in steps)]}
+    again = {id(fit): with_everything(case.problem, fit, case.declared) for fit in [case.final, *(fit for _, fit in steps)]}
     case.final = again[id(case.final)]
     return [(effect, again[id(fit)]) for effect, fit in steps]
 
@@ -722,17 +725,6 @@ def _after(problem: Problem, fit: Fit) -> results.After:
         rmse_c=statistics.rms(fit.residual),
         holdout_rmse_c=problem.holdout_rmse(fit),
         parameters=parameters_of(problem, fit),
-    )
-
-
-def _baseline(case: _Case) -> results.Baseline:
-    """Return the errors of what is declared, by itself: by least squares, as anybody fits it."""
-    return results.Baseline(
-        rmse_c=statistics.rms(case.declared.residual),
-        holdout_rmse_c=case.problem.holdout_rmse(case.declared),
-        noise_c=case.problem.noise_c,
-        parameters=parameters_of(case.problem, case.declared),
-        effects=list(case.declared.spec.effects),
     )
 
 
