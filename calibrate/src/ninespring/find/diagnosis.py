@@ -50,6 +50,8 @@ MOST_ROWS, MOST_READINGS = 6_000, 27_000
 """Of all logs that are fitted; of all their springs: a diagnosis keeps the slopes of some fifty fits, 1 GB of them."""
 MOST_OF_IT = 0.5
 """Part of what is beyond the noise without an effect that it explains, where more is explained than left."""
+ACCOUNTS = 4
+"""Of what was fitted, the likeliest accounts of which one may foretell best."""
 LEAST_PART = 0.01
 """Of a drive or a reading, less is not told as a cause: a board measures power no better, its voltages step by 4 mV."""
 
@@ -304,16 +306,13 @@ class _Case:
     hidden: list[unnamed.Hidden] = field(default_factory=list)
     fits: Mapping[Any, Fit] = field(default_factory=dict)
     """By least squares, of the first search."""
-    first: Fit | None = None
-    """What that found, where only what is alike was looked for and something is left."""
     loose: list[loose.Loose] = field(default_factory=list)
     """Thermometers that were for a while, none of whose readings count then."""
     witnesses: dict[str, Witness] = field(default_factory=dict)
     not_kept: list[str] = field(default_factory=list)
     """Effects that foretell a run no better, in words."""
-    instead: bool = False
-    """Another model is given, which foretells better than what was found, whose names stay: the better baseline, or what least squares
-    found first."""
+    instead: Fit | None = None
+    """What is given because it foretells better than what was found, whose names stay, none that it has not for certain."""
     carried: Fit | None = None
     """What is given in place of the final fit where that foretells worse: without what is of that day."""
 
@@ -399,8 +398,8 @@ def _foretelling(
     """Search by what has a name and is the same in all runs; where that leaves something, by all there is.
 
     What is of one day bends as it likes: it is the better account only where a run that was left out is not foretold better
-    without it. (A cause without a name is in no model: what it leaves in such a run speaks for no stand-in.) Beside either, what
-    least squares found first may foretell best: a model it may be, without naming anything.
+    without it. (A cause without a name is in no model: what it leaves in such a run speaks for no stand-in.) Beside either, another of
+    the likeliest accounts may foretell best: a model it may be, without naming anything.
     """
 
     left_out: list[loose.Loose] = []
@@ -447,8 +446,24 @@ def _foretelling(
     # what bent may have been dropped since, and nothing be left in its place
     instead = set(same[0].adopted) - set(found[0].adopted) if not found[0].hidden else ()
     taken = same if instead and _off(*same) * unseen.WORSE < _off(*found) else found
-    taken[2].unjudged = same[0].first
+    taken[2].accounts = _accounts(same[0])
     return taken
+
+
+def _accounts(case: _Case) -> list[Fit]:
+    """Return the likeliest accounts that were fitted, each at its minimum by least squares: what a part of the runs hardly shows stays
+    there."""
+    problem = case.problem
+    fits = [*case.fits.values(), *case.search.fits.values()]
+    alike = [fit for fit in fits if not any(unseen.of_that_day(*one) for one in fit.spec.variant)]
+    likely: dict[Any, Fit] = {}
+    for fit in sorted(alike, key=lambda one: log_evidence(problem, one, case.declared), reverse=True):
+        likely.setdefault(case.search.key(fit.spec), fit)
+    colour = problem.colour
+    problem.take_for(None)
+    out = [problem.fit(one.spec, one.as_dict(), tolerance=1e-4) for one in list(likely.values())[:ACCOUNTS]]
+    problem.take_for(colour)
+    return out
 
 
 def _rested(plain: _Case, prepared: Callable[[], Problem]) -> _Account | None:
@@ -562,8 +577,6 @@ def _searched(begun: _Begun, alike: bool) -> _Case:
     """Search again where something is left."""
     problem, progress, base, swapped = begun.problem, begun.progress, begun.base, begun.swapped
     found, (final, without, contenders) = begun.search, begun.found
-    # at its minimum: what a part of the runs hardly shows stays there
-    first = _finish(problem, final) if alike and not swapped and unexplained(problem, final) else None
     hidden: list[unnamed.Hidden] = []
     if not swapped and unexplained(problem, final):
         found, (final, without, contenders) = _springs_apart(problem, found, (final, without, contenders))
@@ -587,7 +600,6 @@ def _searched(begun: _Begun, alike: bool) -> _Case:
         swapped=swapped,
         hidden=hidden,
         fits=begun.fits,
-        first=first,
     )
 
 
@@ -652,7 +664,7 @@ def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> re
         why = "nothing else that was tried predicts as well"
         # a lag that foretells better is in the model; a name it is where it explains what a name must
         named = kept is case.declared or judge.worth(kept, case.declared)
-        case.instead = not named or judged_by.instead is not judged_by.plain
+        case.instead = judged_by.instead if not named or judged_by.instead is not judged_by.plain else None
         kept = kept if named else case.declared
     if case.not_kept or why:
         case.final = _finish(problem, kept)
@@ -686,11 +698,11 @@ def _by_least_squares(case: _Case) -> search.Search:
 
 def _given(case: _Case, judged_by: unseen.Unseen, fit: Fit) -> results.Unseen | None:
     """Return how well a run is foretold by what was found or, where that foretells worse, by what is given instead."""
-    case.instead = judged_by.worse(fit) or judged_by.given_worse(fit)
-    if not case.instead:
+    if not (judged_by.worse(fit) or judged_by.given_worse(fit)):
         return judged_by.told(fit)
+    case.instead = judged_by.instead
     why = f"with what was found it would be {judged_by.foretells(fit, judged_by.problem.colour):.2f} K"
-    return judged_by.told(judged_by.instead, why)
+    return judged_by.told(case.instead, why)
 
 
 def _with_what_has_no_name(case: _Case, steps: list[tuple[str, Fit]]) -> list[tuple[str, Fit]]:
@@ -708,15 +720,16 @@ def _the_given(case: _Case, judged_by: unseen.Unseen) -> tuple[Fit, results.Afte
     lasts was taken for noise, may be many times as large.
     """
     problem = case.problem
-    after = None if case.instead else _after(problem, case.final)
+    if case.instead is None:
+        after = _after(problem, case.final)
     if problem.colour is not None:
         slopes = problem.plain_slopes(case.final)
         problem.take_for(None)
         case.final = replace(case.final, jacobian=slopes)
-    if after is not None:
+    if case.instead is None:
         return case.carried or case.final, after
     again = search.Search(problem, case.search.candidates, case.declared)
-    given = _finish(problem, judged_by.refitted(again, judged_by.instead))
+    given = _finish(problem, judged_by.refitted(again, case.instead))
     return given, _after(problem, given)
 
 
@@ -750,7 +763,7 @@ def _listed(
             differ.append(runs_apart.entry(problem, final, effect, strength[effect], sure))
             continue
         probability = max(NAMED, sure.probability())  # where less, what was not seen tells of it
-        if _at_an_end(final, effect):
+        if _at_an_end(final, effect) or (case.instead is not None and effect not in case.instead.spec.effects):
             probability = min(probability, PROBABLE)
         parameters, variant = parameters_of(problem, final, effect), variant_of(final, effect)
         listed.append(

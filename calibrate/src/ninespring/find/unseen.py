@@ -187,8 +187,9 @@ class Unseen:
     problem: Problem
     found: Search
     base: Fit
-    unjudged: Fit | None = None
-    """What least squares found that is the same in all runs, where that leaves something: as names unsure, it may foretell them."""
+    accounts: Sequence[Fit] = ()
+    """The likeliest that were fitted of what is the same in all runs, where all of it leaves something: whatever they are sure of, one
+    may foretell runs best."""
 
     def __post_init__(self) -> None:
         self.splits = splits(self.problem)
@@ -235,9 +236,12 @@ class Unseen:
 
     @property
     def instead(self) -> Fit:
-        """What is given in place of what foretells worse: the plain model, or what least squares found where that foretells better,
-        which is all that it is judged by."""
-        return self._rather(self.unjudged or self.base, self.plain)
+        """What is given in place of what foretells worse: the plain model, or the likeliest account that foretells better, which is all
+        that it is judged by."""
+        best = self.plain
+        for one in self.accounts:
+            best = self._rather(one, best)
+        return best
 
     def _rather(self, one: Fit, other: Fit) -> Fit:
         return one if self.foretells(one) <= self.foretells(other) / WORSE else other
