@@ -157,6 +157,7 @@ def test_a_lag_that_foretells_better_is_in_the_model_and_a_name_only_where_it_ex
     search = SimpleNamespace(base=told.base, refit=lambda *_: told.lagged, worth=lambda *_: worth, reduced=without)
     monkeypatch.setattr(diagnosis.search, "Search", lambda *_: search)
     monkeypatch.setattr(diagnosis, "_finish", lambda problem, fit: fit)
+    monkeypatch.setattr(diagnosis, "_of_account", lambda *_: search)  # nothing of it is sure
     began = SimpleNamespace(candidates=[], progress=None)
     case: Any = SimpleNamespace(final=told.base, declared=told.base, search=began, instead=None)
     case.hidden, case.adopted = [], []
@@ -288,7 +289,8 @@ def test_numbers_that_foretell_runs_left_out_better_are_given_to_what_was_found(
     monkeypatch.setattr(told, "carried", lambda fit, reduced: fit)
     again: list[Any] = []
 
-    def by_least_squares(case: Any) -> Any:
+    def by_least_squares(case: Any, found: Any) -> Any:
+        assert found is case.final
         again.append(case)
         return SimpleNamespace(reduced=without)
 
@@ -309,7 +311,7 @@ def test_by_least_squares_everything_is_fitted_so_again() -> None:
     lasting = problem.fit(base.spec, base.as_dict(), errors=True)
     case: Any = SimpleNamespace(problem=problem, declared=base, final=lasting, contenders=[("a", lasting)])
     case.search, case.adopted = SimpleNamespace(candidates=[], progress=lambda text: None), []
-    judge = diagnosis._by_least_squares(case)
+    judge = diagnosis._by_least_squares(case, lasting)
     assert problem.colour is None and case.search is judge and judge.base is base
     for fit in (case.final, case.contenders[0][1]):
         assert fit.sse < lasting.sse and fit.sse == pytest.approx(base.sse, rel=1e-4)
@@ -347,6 +349,36 @@ def test_what_least_squares_found_is_given_where_it_foretells_better_and_names_n
     assert told.better is told.lagged, "names are judged beside what knows no physics but the declared"
 
 
+@pytest.mark.parametrize(
+    ("names", "found_k"), [(("radiation",), 1.04), (("radiation",), 1.2), (("radiation", RUN_AMBIENT), 1.04)]
+)
+def test_what_is_sure_of_an_account_that_foretells_runs_better_is_named_in_place_of_what_was_found(
+    monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...], found_k: float
+) -> None:
+    """Better than what would be given of that: beside what is of that day, where the rest alone foretells worse."""
+    errors = {"": 3.0, "lag": 3.0, "radiation": 1.2, "latent_heat": 1.02, "latent_heat sensor_gain": 1.0}
+    errors[" ".join(names)] = found_k
+    told = Told(errors)
+    told.accounts = [model("latent_heat", "sensor_gain")]
+
+    def by_least_squares(case: Any, found: Any) -> Any:
+        case.final, case.adopted = found, list(found.spec.effects)
+        return SimpleNamespace(reduced=without)
+
+    monkeypatch.setattr(diagnosis, "_by_least_squares", by_least_squares)
+    monkeypatch.setattr(diagnosis, "_finish", lambda problem, fit: fit)
+    monkeypatch.setattr(diagnosis, "_doubtful", lambda case, judged_by, fresh: ["sensor_gain"])
+    monkeypatch.setattr(diagnosis, "witness", lambda *_: None)
+    told.splits = [SimpleNamespace(alone=False)]  # type: ignore[list-item]
+    case: Any = SimpleNamespace(problem=told.problem, final=model(*names), hidden=[], instead=None, witnesses={})
+    case.problem.runs = [None, None]
+    headline = diagnosis._foretold(case, SimpleNamespace(reduced=without), told)  # type: ignore[arg-type]
+    better = found_k > 1.05
+    assert case.final.spec.effects == (("latent_heat",) if better else names)
+    assert headline is not None and headline.rmse_c == (1.02 if better else found_k)
+    assert case.instead is None, "what is named foretells as well"
+
+
 def test_of_accounts_that_are_near_the_one_that_foretells_best_is_given_and_the_likeliest_where_none_does() -> None:
     """What is likeliest here may be far off in a run that was left out; what foretells as well to a twentieth is chance."""
     told = Told({"": 2.0, "lag": 2.0, "shared_air": 1.0, "radiation": 0.96, "radiation sensor_gain": 0.5})
@@ -372,7 +404,9 @@ def test_a_name_that_what_foretells_better_has_not_is_no_more_than_probable(
     case.witnesses, case.instead = {"radiation": sure, "shared_air": sure}, foretells and model(*foretells)
     monkeypatch.setattr(diagnosis, "parameters_of", lambda *_: {})
     monkeypatch.setattr(diagnosis.effects, "sentence", lambda *_: "")
-    listed, _ = diagnosis._listed(case, [("radiation", fit), ("shared_air", fit)], {"radiation": 9.0, "shared_air": 9.0})
+    listed, _ = diagnosis._listed(
+        case, [("radiation", fit), ("shared_air", fit)], {"radiation": 9.0, "shared_air": 9.0}
+    )
     assert [one.certainty for one in listed] == [
         "probable" if foretells == ("shared_air",) else "certain",
         "certain",

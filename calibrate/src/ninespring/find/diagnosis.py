@@ -603,34 +603,40 @@ def _searched(begun: _Begun, alike: bool) -> _Case:
     )
 
 
-def _judged(case: _Case, judged_by: unseen.Unseen) -> search.Search:
-    """Drop the names that are not sure enough, and search for what they stood in for; return the last search."""
-    problem, judge, witnesses = case.problem, case.search, case.witnesses
+def _doubtful(case: _Case, judged_by: unseen.Unseen, fresh: Sequence[str]) -> list[str]:
+    """Return which of the names that were not judged before are not sure enough."""
+    problem, witnesses = case.problem, case.witnesses
     # where the ambient was not logged, that it drifted is no stand-in
     guessed = all(run.ambient_c is None for run in problem.runs)
     free_to_bend = (*RUNS_OWN, *(["ambient_drift"] if guessed else []))
-    while fresh := [effect for effect in case.without if effect not in witnesses]:
-        likely = case.final if case.hidden else lasting.likeliest(problem, case.final)
-        enough = dict.fromkeys(fresh, True)
-        for effect in fresh:
-            flexible = case.search.is_flexible(case.final, effect) and effect not in free_to_bend
-            witnesses[effect] = witness(problem, case.final, effect, case.without[effect], flexible)
-            if not case.hidden:
-                # each account at its likeliest: what least squares made of the one without it is no evidence
-                nats = log_evidence(problem, likely, lasting.likeliest(problem, case.without[effect]))
-                witnesses[effect] = msgspec.structs.replace(witnesses[effect], nats=nats)
-                enough[effect] = nats - case.search.price() >= search.MIN_EVIDENCE
-        # beside causes without a name that leave structure themselves, a name must explain more than it leaves
-        least = MOST_OF_IT if case.hidden and unexplained(problem, case.final) else 0.0
-        doubtful = [
-            effect
-            for effect in fresh
-            if not enough[effect]
-            or (
-                (witnesses[effect].probability() < NAMED or witnesses[effect].share < least)
-                and (case.hidden or not judged_by.tells(case.final, case.without[effect]))
-            )
-        ]
+    likely = case.final if case.hidden else lasting.likeliest(problem, case.final)
+    enough = dict.fromkeys(fresh, True)
+    for effect in fresh:
+        flexible = case.search.is_flexible(case.final, effect) and effect not in free_to_bend
+        witnesses[effect] = witness(problem, case.final, effect, case.without[effect], flexible)
+        if not case.hidden:
+            # each account at its likeliest: what least squares made of the one without it is no evidence
+            nats = log_evidence(problem, likely, lasting.likeliest(problem, case.without[effect]))
+            witnesses[effect] = msgspec.structs.replace(witnesses[effect], nats=nats)
+            enough[effect] = nats - case.search.price() >= search.MIN_EVIDENCE
+    # beside causes without a name that leave structure themselves, a name must explain more than it leaves
+    least = MOST_OF_IT if case.hidden and unexplained(problem, case.final) else 0.0
+    return [
+        effect
+        for effect in fresh
+        if not enough[effect]
+        or (
+            (witnesses[effect].probability() < NAMED or witnesses[effect].share < least)
+            and (case.hidden or not judged_by.tells(case.final, case.without[effect]))
+        )
+    ]
+
+
+def _judged(case: _Case, judged_by: unseen.Unseen) -> search.Search:
+    """Drop the names that are not sure enough, and search for what they stood in for; return the last search."""
+    judge = case.search
+    while fresh := [effect for effect in case.without if effect not in case.witnesses]:
+        doubtful = _doubtful(case, judged_by, fresh)
         if not doubtful:
             break
         # judged together, beside one another: what one of them stood in for does not count against the rest
@@ -639,9 +645,21 @@ def _judged(case: _Case, judged_by: unseen.Unseen) -> search.Search:
             final = judge.reduced(final, effect)
         # another may be what it stood in for
         others = [one for one in judge.candidates if one.effect not in doubtful]
-        judge = search.Search(problem, others, case.search.base, case.search.progress, case.search.fits)
+        judge = search.Search(case.problem, others, case.search.base, case.search.progress, case.search.fits)
         final, case.without, case.contenders = judge.settle(judge.forward(final))
-        case.final = _finish(problem, final)
+        case.final = _finish(case.problem, final)
+    return judge
+
+
+def _of_account(case: _Case, judged_by: unseen.Unseen, account: Fit) -> search.Search:
+    """Name what is sure of an account that foretells runs left out better than what was found; return a search that begins there."""
+    judge = _by_least_squares(case, account)
+    case.witnesses, case.contenders = {}, []
+    final = case.final
+    for effect in _doubtful(case, judged_by, case.adopted):
+        final = judge.reduced(final, effect)
+    case.final = _finish(case.problem, final)
+    case.without = {effect: judge.reduced(case.final, effect) for effect in case.adopted}
     return judge
 
 
@@ -653,7 +671,11 @@ def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> re
     if problem.colour is not None and len(problem.runs) > 1:
         bare = judged_by.carried(case.final, judge.reduced)
         if judged_by.rmse(bare) < judged_by.own(bare):
-            judge = _by_least_squares(case)
+            judge = _by_least_squares(case, case.final)
+    account = judged_by.instead if judged_by.accounts else judged_by.plain
+    given = judged_by.given(case.final, judged_by.carried(case.final, judge.reduced))
+    if account is not judged_by.plain and judged_by.given_worse(given):
+        judge = _of_account(case, judged_by, account)
     why = ""
     kept, case.not_kept = judged_by.kept(case.final, judge.reduced)
     if kept is None:
@@ -679,8 +701,8 @@ def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> re
     return _given(case, judged_by, given)
 
 
-def _by_least_squares(case: _Case) -> search.Search:
-    """Fit what was found by least squares again; return a search that begins there.
+def _by_least_squares(case: _Case, found: Fit) -> search.Search:
+    """Take for found what was, fitted by least squares again; return a search that begins there.
 
     What a model lacks is no noise: where it lasts, numbers that take it for noise follow quick changes alone, and a run is foretold
     by the slow ones, too. The names are those that the likelihood found.
@@ -688,7 +710,7 @@ def _by_least_squares(case: _Case) -> search.Search:
     problem = case.problem
     problem.take_for(None)
     case.search = search.Search(problem, case.search.candidates, case.declared, case.search.progress)
-    fits = [case.final, *(fit for _, fit in case.contenders)]
+    fits = [found, *(fit for _, fit in case.contenders)]
     final, *others = [problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3) for fit in fits]
     case.contenders = [(effect, fit) for (effect, _), fit in zip(case.contenders, others, strict=True)]
     case.final = _finish(problem, final)
@@ -708,7 +730,9 @@ def _given(case: _Case, judged_by: unseen.Unseen, fit: Fit) -> results.Unseen | 
 def _with_what_has_no_name(case: _Case, steps: list[tuple[str, Fit]]) -> list[tuple[str, Fit]]:
     """Return the steps with everything in the error again: a model is for an array in which what has no name still acts."""
     case.problem.leave_out(None)
-    again = {id(fit): with_everything(case.problem, fit, case.declared) for fit in [case.final, *(fit for _, fit in steps)]}
+    again = {
+        id(fit): with_everything(case.problem, fit, case.declared) for fit in [case.final, *(fit for _, fit in steps)]
+    }
     case.final = again[id(case.final)]
     return [(effect, again[id(fit)]) for effect, fit in steps]
 
