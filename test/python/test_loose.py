@@ -133,9 +133,9 @@ def test_a_log_is_told_of_by_the_model_that_is_given(tmp_path: Path) -> None:
     """What lasts was taken for noise in what was found: its errors are not those of the declared model that is given instead."""
     problem, lasting, plain = wandering(tmp_path)
     found = search.Search(problem, effects.candidates(scene_of(problem)), lasting)
-    case = diagnosis._Case(problem, lambda _: None, found, plain, lasting, lasting, {}, [], [], [], {}, None)
+    case = diagnosis._Case(problem=problem, search=found, declared=plain, final=lasting, without={})
     judged_by: Any = SimpleNamespace(refitted=lambda again, _: again.base, instead=plain)
-    case.instead = True
+    case.instead = plain
     given, after = diagnosis._the_given(case, judged_by)
     assert given is plain and after.rmse_c == statistics.rms(plain.residual) < statistics.rms(lasting.residual)
     assert problem.colour is None and case.final is not given

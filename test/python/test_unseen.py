@@ -44,7 +44,7 @@ class Told(Unseen):
         self.splits = [SimpleNamespace(alone=True)]  # type: ignore[list-item]
         self.base, self.lagged = model(), model(LAG)
         self.lag = SimpleNamespace(effect=LAG)  # type: ignore[assignment]
-        self.unjudged = None
+        self.accounts = ()
 
     def rmse(self, fit: Any, colour: Any = None) -> float:
         return self.known_k["lag" if fit is self.lagged else " ".join(fit.spec.effects)]
@@ -153,20 +153,20 @@ def test_a_lag_that_foretells_better_is_in_the_model_and_a_name_only_where_it_ex
     monkeypatch: pytest.MonkeyPatch, worth: bool, unjudged: bool
 ) -> None:
     told = Told({"": 1.0, "lag": 0.8, "shared_air": 0.7})
-    told.unjudged = model("shared_air") if unjudged else None
+    told.accounts = [model("shared_air")] if unjudged else []
     search = SimpleNamespace(base=told.base, refit=lambda *_: told.lagged, worth=lambda *_: worth, reduced=without)
     monkeypatch.setattr(diagnosis.search, "Search", lambda *_: search)
     monkeypatch.setattr(diagnosis, "_finish", lambda problem, fit: fit)
-    case: Any = SimpleNamespace(
-        final=told.base, declared=told.base, search=SimpleNamespace(candidates=[]), instead=False
-    )
-    case.hidden, case.adopted, case.progress = [], [], None
+    monkeypatch.setattr(diagnosis, "_of_account", lambda *_: search)  # nothing of it is sure
+    began = SimpleNamespace(candidates=[], progress=None)
+    case: Any = SimpleNamespace(final=told.base, declared=told.base, search=began, instead=None)
+    case.hidden, case.adopted = [], []
     case.problem = SimpleNamespace(colour=None, take_for=lambda colour: None)
     headline = diagnosis._foretold(case, search, told)  # type: ignore[arg-type]
     assert headline is not None and headline.rmse_c == (0.7 if unjudged else 0.8)
     assert f"declared model with {'shared_air' if unjudged else 'a lag'}" in headline.text
     assert case.final is (told.lagged if worth else told.base), "what was not judged is no name"
-    assert case.instead == (unjudged or not worth)
+    assert (case.instead is not None) == (unjudged or not worth)
 
 
 def test_an_effect_without_which_most_is_not_foretold_is_no_stand_in() -> None:
@@ -219,7 +219,6 @@ def test_what_bends_as_it_likes_gives_way_to_a_name_that_foretells_better(
     for case in cases.values():
         case.loose = []
         case.problem = case.final = case.search = case.declared = None
-        case.first = case.adopted
     given: list[Any] = []
 
     monkeypatch.setattr(diagnosis, "prepare", lambda *_: None)
@@ -228,9 +227,10 @@ def test_what_bends_as_it_likes_gives_way_to_a_name_that_foretells_better(
     monkeypatch.setattr(diagnosis, "_searched", lambda _, alike: cases[alike])
     monkeypatch.setattr(diagnosis, "_judged", lambda *_: None)
     monkeypatch.setattr(diagnosis, "unexplained", lambda *_: left)
-    monkeypatch.setattr(diagnosis.unseen, "Unseen", lambda *_: SimpleNamespace(unjudged=None))
+    monkeypatch.setattr(diagnosis.unseen, "Unseen", lambda *_: SimpleNamespace(accounts=()))
     monkeypatch.setattr(diagnosis, "_off", lambda case, *_: case.off_k)
     monkeypatch.setattr(diagnosis, "_rested", lambda *_: None)
+    monkeypatch.setattr(diagnosis, "_accounts", lambda case: case.adopted)
 
     def silent(text: str) -> None:
         pass
@@ -238,7 +238,7 @@ def test_what_bends_as_it_likes_gives_way_to_a_name_that_foretells_better(
     runs: Any = [None, None]
     case, _, judged_by = diagnosis._foretelling(Array(1, 2), runs, None, False, silent)
     assert case is cases[taken == "same"]
-    assert judged_by.unjudged is (names if left else None), "it may be given where something is left, whatever is named"
+    assert judged_by.accounts == (names if left else ()), "they may be given where something is left, whatever is named"
     assert given == ([None, {1: "a"}] if left else [None]), "what one search fitted serves the other"
     assert diagnosis._foretelling(Array(1, 2), runs[:1], None, False, silent)[0] is cases[False], "a run alone"
     assert diagnosis._foretelling(Array(1, 2), runs, None, True, silent)[0] is cases[False], "as it is given"
@@ -289,7 +289,8 @@ def test_numbers_that_foretell_runs_left_out_better_are_given_to_what_was_found(
     monkeypatch.setattr(told, "carried", lambda fit, reduced: fit)
     again: list[Any] = []
 
-    def by_least_squares(case: Any) -> Any:
+    def by_least_squares(case: Any, found: Any) -> Any:
+        assert found is case.final
         again.append(case)
         return SimpleNamespace(reduced=without)
 
@@ -308,12 +309,10 @@ def test_by_least_squares_everything_is_fitted_so_again() -> None:
     likelihood(problem, base)
     problem.take_for(base.colour)
     lasting = problem.fit(base.spec, base.as_dict(), errors=True)
-    case: Any = SimpleNamespace(
-        problem=problem, declared=base, base=lasting, final=lasting, contenders=[("a", lasting)]
-    )
-    case.search, case.progress, case.adopted = SimpleNamespace(candidates=[]), lambda text: None, []
-    judge = diagnosis._by_least_squares(case)
-    assert problem.colour is None and case.search is judge and case.base is base
+    case: Any = SimpleNamespace(problem=problem, declared=base, final=lasting, contenders=[("a", lasting)])
+    case.search, case.adopted = SimpleNamespace(candidates=[], progress=lambda text: None), []
+    judge = diagnosis._by_least_squares(case, lasting)
+    assert problem.colour is None and case.search is judge and judge.base is base
     for fit in (case.final, case.contenders[0][1]):
         assert fit.sse < lasting.sse and fit.sse == pytest.approx(base.sse, rel=1e-4)
 
@@ -326,7 +325,7 @@ def test_what_foretells_worse_than_the_better_baseline_keeps_its_name_and_the_ba
     told = Told({"": 2.0, "lag": 1.0, "shared_air": found_k})
     case: Any = SimpleNamespace(instead=None)
     headline = diagnosis._given(case, told, model("shared_air"))
-    assert headline is not None and case.instead == plain
+    assert headline is not None and (case.instead is not None) == plain
     assert headline.rmse_c == (1.0 if plain else found_k), "it is the error of the model that is given"
     assert (
         "declared model with a lag, by least squares: with what was found it would be 1.20 K" in headline.text
@@ -339,15 +338,80 @@ def test_what_least_squares_found_is_given_where_it_foretells_better_and_names_n
 ) -> None:
     """Than what is named, and than the better baseline: what is no sure cause may foretell all the same."""
     told = Told({"": 2.0, "lag": lag_k, "shared_air": found_k, "radiation sensor_gain": 1.0})
-    told.unjudged = model("radiation", "sensor_gain")
+    told.accounts = [model("radiation", "sensor_gain")]
     case: Any = SimpleNamespace(instead=None, final=(found := model("shared_air")))
     headline = diagnosis._given(case, told, found)
-    assert headline is not None and case.instead == given and case.final is found
+    assert headline is not None and (case.instead is not None) == given and case.final is found
     assert headline.rmse_c == (1.0 if given else found_k)
     assert (
         "with radiation and sensor_gain, each named or not, by least squares: with what was" in headline.text
     ) == given
     assert told.better is told.lagged, "names are judged beside what knows no physics but the declared"
+
+
+@pytest.mark.parametrize(
+    ("names", "found_k"), [(("radiation",), 1.04), (("radiation",), 1.2), (("radiation", RUN_AMBIENT), 1.04)]
+)
+def test_what_is_sure_of_an_account_that_foretells_runs_better_is_named_in_place_of_what_was_found(
+    monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...], found_k: float
+) -> None:
+    """Better than what would be given of that: beside what is of that day, where the rest alone foretells worse."""
+    errors = {"": 3.0, "lag": 3.0, "radiation": 1.2, "latent_heat": 1.02, "latent_heat sensor_gain": 1.0}
+    errors[" ".join(names)] = found_k
+    told = Told(errors)
+    told.accounts = [model("latent_heat", "sensor_gain")]
+
+    def by_least_squares(case: Any, found: Any) -> Any:
+        case.final, case.adopted = found, list(found.spec.effects)
+        return SimpleNamespace(reduced=without)
+
+    monkeypatch.setattr(diagnosis, "_by_least_squares", by_least_squares)
+    monkeypatch.setattr(diagnosis, "_finish", lambda problem, fit: fit)
+    monkeypatch.setattr(diagnosis, "_doubtful", lambda case, judged_by, fresh: ["sensor_gain"])
+    monkeypatch.setattr(diagnosis, "witness", lambda *_: None)
+    told.splits = [SimpleNamespace(alone=False)]  # type: ignore[list-item]
+    case: Any = SimpleNamespace(problem=told.problem, final=model(*names), hidden=[], instead=None, witnesses={})
+    case.problem.runs = [None, None]
+    headline = diagnosis._foretold(case, SimpleNamespace(reduced=without), told)  # type: ignore[arg-type]
+    better = found_k > 1.05
+    assert case.final.spec.effects == (("latent_heat",) if better else names)
+    assert headline is not None and headline.rmse_c == (1.02 if better else found_k)
+    assert case.instead is None, "what is named foretells as well"
+
+
+def test_of_accounts_that_are_near_the_one_that_foretells_best_is_given_and_the_likeliest_where_none_does() -> None:
+    """What is likeliest here may be far off in a run that was left out; what foretells as well to a twentieth is chance."""
+    told = Told({"": 2.0, "lag": 2.0, "shared_air": 1.0, "radiation": 0.96, "radiation sensor_gain": 0.5})
+    near = [model("shared_air"), model("radiation"), model("radiation", "sensor_gain")]
+    told.accounts = near
+    assert told.instead is near[2]
+    told.accounts = near[:2]
+    assert told.instead is near[0]
+    told.accounts = [model("")]
+    assert told.instead is told.plain
+
+
+@pytest.mark.parametrize("foretells", [None, ("shared_air",), ("shared_air", "radiation")])
+def test_a_name_that_what_foretells_better_has_not_is_no_more_than_probable(
+    monkeypatch: pytest.MonkeyPatch, foretells: tuple[str, ...] | None
+) -> None:
+    sure = SimpleNamespace(probability=lambda: 0.98)
+    free = SimpleNamespace(effect="radiation", key="emissivity")
+    fit: Any = SimpleNamespace(
+        spec=SimpleNamespace(free=[free], variant=()), residual=[np.zeros(1)], at_bounds=lambda: []
+    )
+    case: Any = SimpleNamespace(problem=SimpleNamespace(holdout_rmse=lambda _: 1.0), final=fit)
+    case.witnesses, case.instead = {"radiation": sure, "shared_air": sure}, foretells and model(*foretells)
+    monkeypatch.setattr(diagnosis, "parameters_of", lambda *_: {})
+    monkeypatch.setattr(diagnosis.effects, "sentence", lambda *_: "")
+    listed, _ = diagnosis._listed(
+        case, [("radiation", fit), ("shared_air", fit)], {"radiation": 9.0, "shared_air": 9.0}
+    )
+    assert [one.certainty for one in listed] == [
+        "probable" if foretells == ("shared_air",) else "certain",
+        "certain",
+    ]
+    assert all((one.probability >= 0.9) == (one.certainty == "certain") for one in listed)
 
 
 @pytest.mark.parametrize(("beside_k", "dropped"), [(1.04, False), (1.2, True)])
@@ -470,6 +534,20 @@ def test_a_declared_number_that_a_part_hardly_shows_stays_as_all_had_it() -> Non
     assert _hardly_shown(told(100.0, 100.0, 100.0), told(50.0, 50.0, 2.0), [0]) == [], (
         "an effect's own number is judged"
     )
+
+
+def test_the_number_of_a_run_that_is_left_out_is_none_of_those_that_stay() -> None:
+    """Of three runs the third is the second of those that stay: the left-out one's room says nothing of its."""
+    of_all, of_part = (
+        SimpleNamespace(
+            spec=Spec((), (), tuple(Free(f"ambient_c@{r + 1}", 20.0, 0.0, 40.0, "degC", run=r) for r in runs), ()),
+            jacobian=np.sqrt(np.diag(information)),
+        )
+        for runs, information in (((0, 1, 2), (50.0, 100.0, 5.0)), ((0, 1), (50.0, 5.0)))
+    )
+    assert _hardly_shown(of_all, of_part, [0, 2]) == []  # type: ignore[arg-type]
+    of_part.jacobian = np.sqrt(np.diag((50.0, 0.4)))
+    assert _hardly_shown(of_all, of_part, [0, 2]) == ["ambient_c@2"]  # type: ignore[arg-type]
 
 
 def heaters(

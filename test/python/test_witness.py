@@ -290,6 +290,24 @@ def test_a_resistance_that_rises_with_temperature_is_told(tmp_path: Path) -> Non
     assert rise.value == pytest.approx(0.0008, rel=0.15)
 
 
+@pytest.mark.parametrize("wanders", [0.0, 0.02])
+def test_v_over_i_that_is_not_explained_to_its_noise_makes_nothing_certain(tmp_path: Path, wanders: float) -> None:
+    """Something else acts in it: what is named may stand in for that, and no heat of a contact is taken out for it."""
+
+    def other(ohm: np.ndarray) -> None:
+        ohm[:, :4] *= 1.0 + wanders * np.sin(np.arange(ROWS) / 40.0)[:, None]
+        ohm[350:, 4] += 0.008
+
+    problem, fit = array_log(tmp_path / "log.csv", ohms=other)
+    second = resistance.witness(problem, fit)
+    assert second is not None and {"resistance_phase", "contact_resistance"} <= {one.name for one in second.effects}
+    for one in second.effects:
+        assert (one.certainty, one.probability < certainty.CERTAIN) == (
+            ("probable", True) if wanders else ("certain", False)
+        )
+    assert bool(second.contacts) == (not wanders)
+
+
 def test_a_cause_of_one_size_always_is_likelier_than_one_that_fits_here_and_not_there() -> None:
     def of(**change: float) -> float:
         usual = {"nats": 100.0, "share": 0.97, "in_time": 0.01, "in_place": 0.02, "left": 1.0, "flexible": False}

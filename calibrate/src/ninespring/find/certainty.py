@@ -20,6 +20,8 @@ STRETCHES = 4
 """Parts of a run in which an effect's size is estimated on its own."""
 CERTAIN = 0.9
 """Probability from which an effect is called certain, not probable."""
+PROBABLE = CERTAIN - 0.01
+"""The most that an effect is sure where something else may be it."""
 NAMED = 0.5
 """Probability from which an effect is named at all."""
 ENOUGH_NATS = 10.0

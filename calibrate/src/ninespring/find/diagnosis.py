@@ -42,7 +42,7 @@ from . import (
     unnamed,
     unseen,
 )
-from .certainty import CERTAIN, NAMED, Witness, witness
+from .certainty import CERTAIN, NAMED, PROBABLE, Witness, witness
 from .evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
 from .residual import depends_on
 
@@ -50,10 +50,10 @@ MOST_ROWS, MOST_READINGS = 6_000, 27_000
 """Of all logs that are fitted; of all their springs: a diagnosis keeps the slopes of some fifty fits, 1 GB of them."""
 MOST_OF_IT = 0.5
 """Part of what is beyond the noise without an effect that it explains, where more is explained than left."""
+ACCOUNTS = 4
+"""Of what was fitted, the likeliest accounts of which one may foretell best."""
 LEAST_PART = 0.01
 """Of a drive or a reading, less is not told as a cause: a board measures power no better, its voltages step by 4 mV."""
-PROBABLE = CERTAIN - 0.01
-"""The most that an effect is sure with a number at its bound."""
 
 
 @dataclass
@@ -288,43 +288,38 @@ def candidates_of(found: search.Search, final: Fit, base: Fit) -> list[results.C
     return sorted(candidates, key=lambda one: -one.evidence_over_baseline)
 
 
-@dataclass
+@dataclass(kw_only=True)
 class _Case:
     """A diagnosis under way: what was found so far."""
 
     problem: Problem
-    progress: Callable[[str], None]
     search: search.Search
+    """What found it, beside its base: what is declared, with what lasts taken for noise where something is left."""
     declared: Fit
     """The declared model alone."""
-    base: Fit
-    """What the effects are found beside: that, with what lasts taken for noise where something is left."""
     final: Fit
     without: dict[str, Fit]
     """The final fit without each effect that it has found."""
-    contenders: list[tuple[str, Fit]]
-    swapped: list[str]
+    contenders: list[tuple[str, Fit]] = field(default_factory=list)
+    swapped: list[str] = field(default_factory=list)
     """Columns that are, in words."""
-    hidden: list[unnamed.Hidden]
-    fits: Mapping[Any, Fit]
+    hidden: list[unnamed.Hidden] = field(default_factory=list)
+    fits: Mapping[Any, Fit] = field(default_factory=dict)
     """By least squares, of the first search."""
-    first: Fit | None
-    """What that found, where only what is alike was looked for and something is left."""
     loose: list[loose.Loose] = field(default_factory=list)
     """Thermometers that were for a while, none of whose readings count then."""
     witnesses: dict[str, Witness] = field(default_factory=dict)
     not_kept: list[str] = field(default_factory=list)
     """Effects that foretell a run no better, in words."""
-    instead: bool = False
-    """Another model is given, which foretells better than what was found, whose names stay: the better baseline, or what least squares
-    found first."""
+    instead: Fit | None = None
+    """What is given because it foretells better than what was found, whose names stay, none that it has not for certain."""
     carried: Fit | None = None
     """What is given in place of the final fit where that foretells worse: without what is of that day."""
 
     @property
     def adopted(self) -> list[str]:
         """Effects that were found."""
-        return [e for e in self.final.spec.effects if e not in self.base.spec.effects]
+        return [e for e in self.final.spec.effects if e not in self.declared.spec.effects]
 
 
 _Account = tuple[_Case, search.Search, unseen.Unseen]
@@ -341,9 +336,9 @@ def _diagnose(
     headline = _foretold(case, judge, judged_by)
     left_over = unexplained(problem, case.final) or bool(case.hidden)
     strength = {e: log_evidence(problem, case.final, case.without[e]) for e in case.adopted}
-    steps = in_order(case.search, case.base, case.final, case.adopted)
+    steps = in_order(case.search, case.search.base, case.final, case.adopted)
     rivals = rivals_of(case.search, case.final, [effect for effect, _ in steps], case.contenders, progress)
-    tried = candidates_of(case.search, case.final, case.base)
+    tried = candidates_of(case.search, case.final, case.search.base)
     if case.hidden:
         steps = _with_what_has_no_name(case, steps)
     listed, differ = _listed(case, steps, strength)
@@ -352,7 +347,12 @@ def _diagnose(
     given, after = _the_given(case, judged_by)
     # what is told of the logs, and of what is left of them, is told by the model that is given
     shown = given if case.instead else case.final
-    baseline = _baseline(case)
+    # what is declared, by itself: by least squares, as anybody fits it
+    baseline = results.Baseline(
+        noise_c=problem.noise_c,
+        effects=list(case.declared.spec.effects),
+        **msgspec.structs.asdict(_after(problem, case.declared)),
+    )
     progress("what v / i says")
     second = None if case.swapped else resistance.witness(problem, shown)
     impossible = doubt.impossible(second)
@@ -398,8 +398,8 @@ def _foretelling(
     """Search by what has a name and is the same in all runs; where that leaves something, by all there is.
 
     What is of one day bends as it likes: it is the better account only where a run that was left out is not foretold better
-    without it. (A cause without a name is in no model: what it leaves in such a run speaks for no stand-in.) Beside either, what
-    least squares found first may foretell best: a model it may be, without naming anything.
+    without it. (A cause without a name is in no model: what it leaves in such a run speaks for no stand-in.) Beside either, another of
+    the likeliest accounts may foretell best: a model it may be, without naming anything.
     """
 
     left_out: list[loose.Loose] = []
@@ -446,8 +446,24 @@ def _foretelling(
     # what bent may have been dropped since, and nothing be left in its place
     instead = set(same[0].adopted) - set(found[0].adopted) if not found[0].hidden else ()
     taken = same if instead and _off(*same) * unseen.WORSE < _off(*found) else found
-    taken[2].unjudged = same[0].first
+    taken[2].accounts = _accounts(same[0])
     return taken
+
+
+def _accounts(case: _Case) -> list[Fit]:
+    """Return the likeliest accounts that were fitted, each at its minimum by least squares: what a part of the runs hardly shows stays
+    there."""
+    problem = case.problem
+    fits = [*case.fits.values(), *case.search.fits.values()]
+    alike = [fit for fit in fits if not any(unseen.of_that_day(*one) for one in fit.spec.variant)]
+    likely: dict[Any, Fit] = {}
+    for fit in sorted(alike, key=lambda one: log_evidence(problem, one, case.declared), reverse=True):
+        likely.setdefault(case.search.key(fit.spec), fit)
+    colour = problem.colour
+    problem.take_for(None)
+    out = [problem.fit(one.spec, one.as_dict(), tolerance=1e-4) for one in list(likely.values())[:ACCOUNTS]]
+    problem.take_for(colour)
+    return out
 
 
 def _rested(plain: _Case, prepared: Callable[[], Problem]) -> _Account | None:
@@ -459,7 +475,9 @@ def _rested(plain: _Case, prepared: Callable[[], Problem]) -> _Account | None:
     if RUN_AMBIENT in plain.adopted and alloys & set(plain.adopted):
         return None
     problem = prepared()
-    first = search.Search(problem, plain.search.candidates, first_fit(problem, plain.declared.spec), plain.progress)
+    first = search.Search(
+        problem, plain.search.candidates, first_fit(problem, plain.declared.spec), plain.search.progress
+    )
     judged_by = unseen.Unseen(problem, first, first.base)
     searched = rested.search_rested(first, judged_by)
     if searched is None:
@@ -467,19 +485,13 @@ def _rested(plain: _Case, prepared: Callable[[], Problem]) -> _Account | None:
     found, final, without = searched
     final = _finish(problem, final)
     case = _Case(
-        problem,
-        plain.progress,
-        found,
-        first.base,
-        found.base,
-        final,
-        without,
-        [],
-        plain.swapped,
-        [],
-        {},
-        None,
-        plain.loose,
+        problem=problem,
+        search=found,
+        declared=first.base,
+        final=final,
+        without=without,
+        swapped=plain.swapped,
+        loose=plain.loose,
     )
     case.witnesses = {effect: witness(problem, final, effect, other, False) for effect, other in without.items()}
     return case, found, judged_by
@@ -565,8 +577,6 @@ def _searched(begun: _Begun, alike: bool) -> _Case:
     """Search again where something is left."""
     problem, progress, base, swapped = begun.problem, begun.progress, begun.base, begun.swapped
     found, (final, without, contenders) = begun.search, begun.found
-    # at its minimum: what a part of the runs hardly shows stays there
-    first = _finish(problem, final) if alike and not swapped and unexplained(problem, final) else None
     hidden: list[unnamed.Hidden] = []
     if not swapped and unexplained(problem, final):
         found, (final, without, contenders) = _springs_apart(problem, found, (final, without, contenders))
@@ -581,38 +591,52 @@ def _searched(begun: _Begun, alike: bool) -> _Case:
     progress("held-out blocks")
     final = _finish(problem, final)
     return _Case(
-        problem, progress, found, base, found.base, final, without, contenders, swapped, hidden, begun.fits, first
+        problem=problem,
+        search=found,
+        declared=base,
+        final=final,
+        without=without,
+        contenders=contenders,
+        swapped=swapped,
+        hidden=hidden,
+        fits=begun.fits,
     )
+
+
+def _doubtful(case: _Case, judged_by: unseen.Unseen, fresh: Sequence[str]) -> list[str]:
+    """Return which of the names that were not judged before are not sure enough."""
+    problem, witnesses = case.problem, case.witnesses
+    # where the ambient was not logged, that it drifted is no stand-in
+    guessed = all(run.ambient_c is None for run in problem.runs)
+    free_to_bend = (*RUNS_OWN, *(["ambient_drift"] if guessed else []))
+    likely = case.final if case.hidden else lasting.likeliest(problem, case.final)
+    enough = dict.fromkeys(fresh, True)
+    for effect in fresh:
+        flexible = case.search.is_flexible(case.final, effect) and effect not in free_to_bend
+        witnesses[effect] = witness(problem, case.final, effect, case.without[effect], flexible)
+        if not case.hidden:
+            # each account at its likeliest: what least squares made of the one without it is no evidence
+            nats = log_evidence(problem, likely, lasting.likeliest(problem, case.without[effect]))
+            witnesses[effect] = msgspec.structs.replace(witnesses[effect], nats=nats)
+            enough[effect] = nats - case.search.price() >= search.MIN_EVIDENCE
+    # beside causes without a name that leave structure themselves, a name must explain more than it leaves
+    least = MOST_OF_IT if case.hidden and unexplained(problem, case.final) else 0.0
+    return [
+        effect
+        for effect in fresh
+        if not enough[effect]
+        or (
+            (witnesses[effect].probability() < NAMED or witnesses[effect].share < least)
+            and (case.hidden or not judged_by.tells(case.final, case.without[effect]))
+        )
+    ]
 
 
 def _judged(case: _Case, judged_by: unseen.Unseen) -> search.Search:
     """Drop the names that are not sure enough, and search for what they stood in for; return the last search."""
-    problem, judge, witnesses = case.problem, case.search, case.witnesses
-    # where the ambient was not logged, that it drifted is no stand-in
-    guessed = all(run.ambient_c is None for run in problem.runs)
-    free_to_bend = (*RUNS_OWN, *(["ambient_drift"] if guessed else []))
-    while fresh := [effect for effect in case.without if effect not in witnesses]:
-        likely = case.final if case.hidden else lasting.likeliest(problem, case.final)
-        enough = dict.fromkeys(fresh, True)
-        for effect in fresh:
-            flexible = case.search.is_flexible(case.final, effect) and effect not in free_to_bend
-            witnesses[effect] = witness(problem, case.final, effect, case.without[effect], flexible)
-            if not case.hidden:
-                # each account at its likeliest: what least squares made of the one without it is no evidence
-                nats = log_evidence(problem, likely, lasting.likeliest(problem, case.without[effect]))
-                witnesses[effect] = msgspec.structs.replace(witnesses[effect], nats=nats)
-                enough[effect] = nats - case.search.price() >= search.MIN_EVIDENCE
-        # beside causes without a name that leave structure themselves, a name must explain more than it leaves
-        least = MOST_OF_IT if case.hidden and unexplained(problem, case.final) else 0.0
-        doubtful = [
-            effect
-            for effect in fresh
-            if not enough[effect]
-            or (
-                (witnesses[effect].probability() < NAMED or witnesses[effect].share < least)
-                and (case.hidden or not judged_by.tells(case.final, case.without[effect]))
-            )
-        ]
+    judge = case.search
+    while fresh := [effect for effect in case.without if effect not in case.witnesses]:
+        doubtful = _doubtful(case, judged_by, fresh)
         if not doubtful:
             break
         # judged together, beside one another: what one of them stood in for does not count against the rest
@@ -621,9 +645,21 @@ def _judged(case: _Case, judged_by: unseen.Unseen) -> search.Search:
             final = judge.reduced(final, effect)
         # another may be what it stood in for
         others = [one for one in judge.candidates if one.effect not in doubtful]
-        judge = search.Search(problem, others, case.base, case.progress, case.search.fits)
+        judge = search.Search(case.problem, others, case.search.base, case.search.progress, case.search.fits)
         final, case.without, case.contenders = judge.settle(judge.forward(final))
-        case.final = _finish(problem, final)
+        case.final = _finish(case.problem, final)
+    return judge
+
+
+def _of_account(case: _Case, judged_by: unseen.Unseen, account: Fit) -> search.Search:
+    """Name what is sure of an account that foretells runs left out better than what was found; return a search that begins there."""
+    judge = _by_least_squares(case, account)
+    case.witnesses, case.contenders = {}, []
+    final = case.final
+    for effect in _doubtful(case, judged_by, case.adopted):
+        final = judge.reduced(final, effect)
+    case.final = _finish(case.problem, final)
+    case.without = {effect: judge.reduced(case.final, effect) for effect in case.adopted}
     return judge
 
 
@@ -635,20 +671,23 @@ def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> re
     if problem.colour is not None and len(problem.runs) > 1:
         bare = judged_by.carried(case.final, judge.reduced)
         if judged_by.rmse(bare) < judged_by.own(bare):
-            judge = _by_least_squares(case)
+            judge = _by_least_squares(case, case.final)
+    account = judged_by.instead if judged_by.accounts else judged_by.plain
+    given = judged_by.given(case.final, judged_by.carried(case.final, judge.reduced))
+    if account is not judged_by.plain and judged_by.given_worse(given):
+        judge = _of_account(case, judged_by, account)
     why = ""
     kept, case.not_kept = judged_by.kept(case.final, judge.reduced)
     if kept is None:
         # as anybody fits it, by least squares: nothing that is known of its errors predicts better
         problem.take_for(None)
-        case.base = case.declared
-        case.search = judge = search.Search(problem, case.search.candidates, case.base, case.progress)
+        case.search = judge = search.Search(problem, case.search.candidates, case.declared, case.search.progress)
         kept, case.contenders = judged_by.refitted(judge, judged_by.plain), []
         why = "nothing else that was tried predicts as well"
         # a lag that foretells better is in the model; a name it is where it explains what a name must
-        named = kept is case.base or judge.worth(kept, case.base)
-        case.instead = not named or judged_by.instead is not judged_by.plain
-        kept = kept if named else case.base
+        named = kept is case.declared or judge.worth(kept, case.declared)
+        case.instead = judged_by.instead if not named or judged_by.instead is not judged_by.plain else None
+        kept = kept if named else case.declared
     if case.not_kept or why:
         case.final = _finish(problem, kept)
         case.without = {effect: judge.reduced(case.final, effect) for effect in case.adopted}
@@ -662,17 +701,16 @@ def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> re
     return _given(case, judged_by, given)
 
 
-def _by_least_squares(case: _Case) -> search.Search:
-    """Fit what was found by least squares again; return a search that begins there.
+def _by_least_squares(case: _Case, found: Fit) -> search.Search:
+    """Take for found what was, fitted by least squares again; return a search that begins there.
 
     What a model lacks is no noise: where it lasts, numbers that take it for noise follow quick changes alone, and a run is foretold
     by the slow ones, too. The names are those that the likelihood found.
     """
     problem = case.problem
     problem.take_for(None)
-    case.base = case.declared
-    case.search = search.Search(problem, case.search.candidates, case.base, case.progress)
-    fits = [case.final, *(fit for _, fit in case.contenders)]
+    case.search = search.Search(problem, case.search.candidates, case.declared, case.search.progress)
+    fits = [found, *(fit for _, fit in case.contenders)]
     final, *others = [problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3) for fit in fits]
     case.contenders = [(effect, fit) for (effect, _), fit in zip(case.contenders, others, strict=True)]
     case.final = _finish(problem, final)
@@ -682,18 +720,19 @@ def _by_least_squares(case: _Case) -> search.Search:
 
 def _given(case: _Case, judged_by: unseen.Unseen, fit: Fit) -> results.Unseen | None:
     """Return how well a run is foretold by what was found or, where that foretells worse, by what is given instead."""
-    case.instead = judged_by.worse(fit) or judged_by.given_worse(fit)
-    if not case.instead:
+    if not (judged_by.worse(fit) or judged_by.given_worse(fit)):
         return judged_by.told(fit)
+    case.instead = judged_by.instead
     why = f"with what was found it would be {judged_by.foretells(fit, judged_by.problem.colour):.2f} K"
-    return judged_by.told(judged_by.instead, why)
+    return judged_by.told(case.instead, why)
 
 
 def _with_what_has_no_name(case: _Case, steps: list[tuple[str, Fit]]) -> list[tuple[str, Fit]]:
     """Return the steps with everything in the error again: a model is for an array in which what has no name still acts."""
     case.problem.leave_out(None)
-    case.base = case.declared
-    again = {id(fit): with_everything(case.problem, fit, case.base) for fit in [case.final, *(fit for _, fit in steps)]}
+    again = {
+        id(fit): with_everything(case.problem, fit, case.declared) for fit in [case.final, *(fit for _, fit in steps)]
+    }
     case.final = again[id(case.final)]
     return [(effect, again[id(fit)]) for effect, fit in steps]
 
@@ -705,15 +744,16 @@ def _the_given(case: _Case, judged_by: unseen.Unseen) -> tuple[Fit, results.Afte
     lasts was taken for noise, may be many times as large.
     """
     problem = case.problem
-    after = None if case.instead else _after(problem, case.final)
+    if case.instead is None:
+        after = _after(problem, case.final)
     if problem.colour is not None:
         slopes = problem.plain_slopes(case.final)
         problem.take_for(None)
         case.final = replace(case.final, jacobian=slopes)
-    if after is not None:
+    if case.instead is None:
         return case.carried or case.final, after
     again = search.Search(problem, case.search.candidates, case.declared)
-    given = _finish(problem, judged_by.refitted(again, judged_by.instead))
+    given = _finish(problem, judged_by.refitted(again, case.instead))
     return given, _after(problem, given)
 
 
@@ -722,17 +762,6 @@ def _after(problem: Problem, fit: Fit) -> results.After:
         rmse_c=statistics.rms(fit.residual),
         holdout_rmse_c=problem.holdout_rmse(fit),
         parameters=parameters_of(problem, fit),
-    )
-
-
-def _baseline(case: _Case) -> results.Baseline:
-    """Return the errors of what is declared, by itself: by least squares, as anybody fits it."""
-    return results.Baseline(
-        rmse_c=statistics.rms(case.declared.residual),
-        holdout_rmse_c=case.problem.holdout_rmse(case.declared),
-        noise_c=case.problem.noise_c,
-        parameters=parameters_of(case.problem, case.declared),
-        effects=list(case.declared.spec.effects),
     )
 
 
@@ -758,7 +787,7 @@ def _listed(
             differ.append(runs_apart.entry(problem, final, effect, strength[effect], sure))
             continue
         probability = max(NAMED, sure.probability())  # where less, what was not seen tells of it
-        if _at_an_end(final, effect):
+        if _at_an_end(final, effect) or (case.instead is not None and effect not in case.instead.spec.effects):
             probability = min(probability, PROBABLE)
         parameters, variant = parameters_of(problem, final, effect), variant_of(final, effect)
         listed.append(

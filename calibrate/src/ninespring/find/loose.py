@@ -88,10 +88,11 @@ def without(run: Run, number: int, left_out: Sequence[Loose]) -> Run:
 
 def find(problem: Problem, final: Fit) -> Loose | None:
     """Return the thermometer that is loose for a while by what a fit leaves, None where that is not the likeliest of all there is."""
-    window, fit = _window(problem, final)
+    found = _window(problem, final)
     problem.leave_out(None)
-    if window is None or fit is None:
+    if found is None:
         return None
+    window, fit, rival = found
     at_step = _at_its_step(problem, fit, window)
     beside = _beside(problem, fit, _column(problem, at_step))
     off, left = (max(0.0, one.sse - one.count) for one in (final, beside))
@@ -102,7 +103,7 @@ def find(problem: Problem, final: Fit) -> Loose | None:
     without = max(_nats(problem, final, None), _nats(problem, _beside(problem, fit, whole), whole))
     if nats - math.log(problem.count * len(LATE_S)) - without < LEAST_NATS:
         return None
-    rival = _rival(problem, final)  # chosen from about as many
+    # chosen from about as many
     if rival is not None and nats <= _nats(problem, _beside(problem, final, rival), rival):
         return None
     return at_step
@@ -130,10 +131,10 @@ def _slopes(problem: Problem, fit: Fit) -> Fit:
     return replace(fit, jacobian=problem.jacobian(fit.spec, fit.values, problem.predictions(fit.spec, fit.values)))
 
 
-def _window(problem: Problem, final: Fit) -> tuple[Hidden | None, Fit | None]:
-    """Return the window of one thermometer that explains most, and the fit beside it; none where heat would explain as much, or it is
-    too little to be told."""
-    fit, found = final, None
+def _window(problem: Problem, final: Fit) -> tuple[Hidden, Fit, np.ndarray | None] | None:
+    """Return the window of one thermometer that explains most, the fit beside it, and what the best of all other causes adds to the
+    readings, (count, 1); None where heat would explain as much, or it is too little to be told."""
+    fit, found, rival = final, None, None
     for turn in range(AROUND):
         bare = _slopes(problem, fit) if turn or fit.jacobian is None else fit
         basis, left = laid_bare(problem, bare)
@@ -142,14 +143,18 @@ def _window(problem: Problem, final: Fit) -> tuple[Hidden | None, Fit | None]:
             (_best(one, basis, left) for one in of_thermometers(problem, bare)), key=lambda one: one[0], default=_NONE
         )
         if cause is None or drop < SHARE * beyond:
-            return None, None
-        if turn == 0 and drop <= _of_others(problem, bare, basis, left)[0]:
-            return None, None
+            return None
+        if turn == 0:
+            most_of_others, other = _of_others(problem, bare, basis, left)
+            if drop <= most_of_others:
+                return None
+            if other is not None:
+                rival = column_of(problem, bare, other[0], typical_power(problem, bare), *other[1])
         if found is not None and (found.cause.text, found.rows) == (cause.text, span):
             break
         found = Hidden(cause, cause.text, span, column_of(problem, bare, cause, 1.0, *span))
         fit = _beside(problem, bare, found.column)
-    return found, fit
+    return None if found is None else (found, fit, rival)
 
 
 _NONE: tuple[float, Cause | None, tuple[int, int]] = (0.0, None, (0, 0))
@@ -191,15 +196,6 @@ def _of_others(
             gain_of_it = float(column @ left) ** 2 / float(column @ column)
             best = max(best, (gain_of_it, (one, (0, None))), key=lambda it: it[0])
     return best
-
-
-def _rival(problem: Problem, final: Fit) -> np.ndarray | None:
-    """Return what the best of all other causes adds to the readings, (count, 1)."""
-    bare = final if final.jacobian is not None else _slopes(problem, final)
-    _, found = _of_others(problem, bare, *laid_bare(problem, bare))
-    if found is None:
-        return None
-    return column_of(problem, bare, found[0], typical_power(problem, bare), *found[1])
 
 
 def _spring_of(cause: Cause) -> int | None:

@@ -17,7 +17,8 @@ from ..io import results
 from ..model import effects
 from ..model.models import Model
 from . import contacts
-from .certainty import CERTAIN
+from .certainty import CERTAIN, PROBABLE
+from .evidence import UNEXPLAINED
 from .readings import SEEN, Linear, Readings, nats_of, readings, solve
 
 OF_THE_WIRE = "resistance_phase", "resistance_temperature"
@@ -37,6 +38,7 @@ class Second:
     told: results.Resistance
     effects: list[results.Effect]
     contacts: list[contacts.Step]
+    """None where v / i is unexplained with them."""
 
 
 def told(
@@ -211,4 +213,10 @@ def witness(problem: Problem, fit: Fit) -> Second | None:
         after_ohm=rms_ohm(model.rest),
         parameters={key: _combined(model, parts) for key, parts in resistances.items()},
     )
-    return Second(said, [*named, *(of_contact(one) for one in steps)], steps)
+    listed = [*named, *(of_contact(one) for one in steps)]
+    if model.spread <= 1.0 + UNEXPLAINED**2:
+        return Second(said, listed, steps)
+    # something else acts in v / i, and what is named may stand in for it: no heat is taken out for that
+    for one in listed:
+        one.probability, one.certainty = min(one.probability, PROBABLE), "probable"
+    return Second(said, listed, [])

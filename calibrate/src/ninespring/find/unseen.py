@@ -99,8 +99,8 @@ def _problem(whole: Problem, runs: Sequence[Run], kept: Sequence[int]) -> Proble
 
 
 def _own(free: Free, kept: Sequence[int]) -> str:
-    """Return the key that a number has where only these runs are fitted."""
-    if free.run is None or free.run not in kept:
+    """Return the key that a number of all runs, or of one of these, has where only these are fitted."""
+    if free.run is None:
         return free.key
     return free.key.replace(f"@{free.run + 1}", f"@{kept.index(free.run) + 1}")
 
@@ -123,7 +123,7 @@ def _hardly_shown(whole: Fit, part: Fit, kept: Sequence[int]) -> list[str]:
     return [
         _own(f, kept)
         for f, all_of_it in mine
-        if f.effect is None and _own(f, kept) in told and told[_own(f, kept)] < HARDLY * all_of_it
+        if f.effect is None and (f.run is None or f.run in kept) and told[_own(f, kept)] < HARDLY * all_of_it
     ]
 
 
@@ -187,8 +187,9 @@ class Unseen:
     problem: Problem
     found: Search
     base: Fit
-    unjudged: Fit | None = None
-    """What least squares found that is the same in all runs, where that leaves something: as names unsure, it may foretell them."""
+    accounts: Sequence[Fit] = ()
+    """The likeliest that were fitted of what is the same in all runs, where all of it leaves something: whatever they are sure of, one
+    may foretell runs best."""
 
     def __post_init__(self) -> None:
         self.splits = splits(self.problem)
@@ -235,9 +236,12 @@ class Unseen:
 
     @property
     def instead(self) -> Fit:
-        """What is given in place of what foretells worse: the plain model, or what least squares found where that foretells better,
-        which is all that it is judged by."""
-        return self._rather(self.unjudged or self.base, self.plain)
+        """What is given in place of what foretells worse: the plain model, or the likeliest account that foretells better, which is all
+        that it is judged by."""
+        best = self.plain
+        for one in self.accounts:
+            best = self._rather(one, best)
+        return best
 
     def _rather(self, one: Fit, other: Fit) -> Fit:
         return one if self.foretells(one) <= self.foretells(other) / WORSE else other
