@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ninespring.find import diagnosis
+from ninespring.find import diagnosis, doubt
 from ninespring.find.diagnosis import first_fit
 from ninespring.find.evidence import likelihood
 from ninespring.find.lasting import likeliest
@@ -493,6 +493,17 @@ def test_what_shows_the_same_in_commands_is_looked_for_once(springs: int) -> Non
     unlogged = library.candidates(scene_of(Problem(Array(1, springs), [replace(wide, ambient_c=None)])))
     assert [one for one in unlogged if one.variant == "all sensors"], "beside no log of the room it stands for both"
     assert [one.mirror is not None for one in known if one.effect == LAG] == [springs > 1]
+
+
+def test_a_spring_that_no_log_drives_is_said() -> None:
+    """Of its commands nothing is known: a run that drives it was foretold at 218 degC."""
+    run = one_node(0.0)
+    first = np.hstack([run.drive, 0.0 * run.drive])
+    wide = replace(run, drive=first, temperature_c=np.repeat(run.temperature_c, 2, axis=1))
+    said = doubt.never_driven(Problem(Array(1, 2), [wide, wide]))
+    assert len(said) == 1 and said[0].startswith("spring 2 is driven in none of these logs")
+    assert doubt.never_driven(Problem(Array(1, 2), [wide, replace(wide, drive=first[:, ::-1])])) == []
+    assert doubt.never_driven(Problem(Array(1, 2), [replace(wide, mode="power")])) == []
 
 
 def test_a_room_drifts_no_faster_than_rooms_do() -> None:

@@ -94,9 +94,22 @@ def of_rooms(problem: Problem, fit: Fit) -> list[str]:
     ]
 
 
+def never_driven(problem: Problem) -> list[str]:
+    """Return a warning for each spring of which nothing but commands is logged, and none in any run."""
+    driven = np.any([np.any(run.drive > 0, axis=0) for run in problem.runs], axis=0)
+    if any(run.mode != "command" for run in problem.runs):
+        return []
+    declared_w = problem.base_value("command_power_w")
+    return [
+        f"spring {k + 1} is driven in none of these logs: what a command gives it is not known, and where one drives it `predict` "
+        f"takes {declared_w:g} W for the whole of it, as declared; log a run that drives it"
+        for k in np.flatnonzero(~driven)
+    ]
+
+
 def not_logged(problem: Problem, fit: Fit) -> list[str]:
     """Return what is to be said of a fit because something was not logged."""
-    return of_rooms(problem, fit) + about_power(problem)
+    return of_rooms(problem, fit) + about_power(problem) + never_driven(problem)
 
 
 def _of_springs(problem: Problem, fit: Fit) -> dict[str, str]:
