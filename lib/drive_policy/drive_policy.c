@@ -229,11 +229,11 @@ static void heat(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
     const bool ends = is_limited(policy, in, k) || is_stalled(s) ||
                       (full && spring_estimator_has_transformed(in->belief, in->model, k));
     const bool asks = !full || s->partly || waits; /* as a rule not, and once */
-    if (ends || (!full && spring_estimator_has_reached(in->belief, in->model, k, level))) {
+    const float phase = !ends && asks ? phase_of(in, k) : 0.0f;
+    if (ends || (!full && phase >= level)) {
         enter(policy, in, k, DRIVE_POLICY_STAGE_HOLD, level_permille);
         return;
     }
-    const float phase = asks ? phase_of(in, k) : 0.0f;
     /* as it rests there is nothing to wait for at this power: it is over, or needs more. Above its
      * finish it is over anyway, but for its ends */
     const bool ahead = s->partly && phase > 0.5f &&

@@ -598,19 +598,6 @@ bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal
     return surely_finished(b, model, k, sds);
 }
 
-bool spring_estimator_has_reached(const spring_estimator_t *e, const thermal_model_t *model,
-                                  uint8_t k, float level)
-{
-    const spring_belief_t *b = &e->spring[k];
-    if (b->possible != SPRING_PHASE_MARTENSITE || !spring_estimator_sees(b)) {
-        return spring_estimator_phase(e, model, k) >= level;
-    }
-    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
-    const float width_k = spring_c((int16_t)(t.austenite_finish_c7 - t.austenite_start_c7));
-    return spring_now_c(model, k) - TRUST_STILL_SDS * spring_estimator_sd_k(b) >
-           spring_c(t.austenite_start_c7) + level * width_k;
-}
-
 void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, uint8_t k,
                                  bool full)
 {

@@ -330,10 +330,6 @@ static inline bool spring_estimator_may_look(const spring_estimator_t *estimator
 /* The heating has fully transformed it: seen, or as hot as it takes whatever it reads. */
 bool spring_estimator_has_transformed(const spring_estimator_t *estimator,
                                       const thermal_model_t *model, uint8_t spring);
-/* The heating has come to a level, 0..1: by what it reads, or, until its beginning is seen, as hot
- * as that takes it whatever it reads. */
-bool spring_estimator_has_reached(const spring_estimator_t *estimator, const thermal_model_t *model,
-                                  uint8_t spring, float level);
 /* It reads less than when it had transformed last, and the difference is neither noise nor a
  * temperature coefficient. */
 bool spring_estimator_lacks_phase(const spring_belief_t *belief, const thermal_model_t *model,

@@ -81,7 +81,5 @@ void spring_level_watch(spring_estimator_t *e, spring_belief_t *b, thermal_model
         see_falling(e, b, model, k, fabsf(left) * per_change, d.unsure * per_change);
     }
     spring_note_read(e, k, left, sqrtf(d.noise2 + d.unsure * d.unsure));
-    spring_set_phase(model, k, spring_estimator_phase(e, model, k));
-    b->last_c7 = thermal_model_temperature_c7(model, k);
     spring_begin_line(b, true, share);
 }
