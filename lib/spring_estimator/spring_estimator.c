@@ -71,21 +71,6 @@ void spring_set_temperature(thermal_model_t *model, uint8_t k, float temperature
     thermal_model_set_temperature(model, k, as_c7(temperature_c));
 }
 
-float spring_heated_at_c(const thermal_model_t *model, uint8_t k, float phase)
-{
-    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
-    const float width_k = spring_c((int16_t)(t.austenite_finish_c7 - t.austenite_start_c7));
-    const float share = phase < 0.5f ? sqrtf(0.5f * phase) : 1.0f - sqrtf(0.5f * (1.0f - phase));
-    return spring_c(t.austenite_start_c7) + share * width_k;
-}
-
-void spring_set_phase(thermal_model_t *model, uint8_t k, float phase)
-{
-    const int16_t now_c7 = thermal_model_temperature_c7(model, k);
-    spring_set_temperature(model, k, spring_heated_at_c(model, k, phase), SPRING_PHASE_MARTENSITE);
-    thermal_model_set_temperature(model, k, now_c7);
-}
-
 float spring_distance_k2(const spring_belief_t *b)
 {
     return b->variance_k2 + b->capacity_k * b->capacity_k;

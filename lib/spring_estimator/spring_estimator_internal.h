@@ -95,10 +95,6 @@ float spring_above_ambient_k(const thermal_model_t *model, uint8_t spring);
  * (SPRING_PHASE_MARTENSITE or _AUSTENITE). */
 void spring_set_temperature(thermal_model_t *model, uint8_t spring, float temperature_c,
                             uint8_t from);
-/* Where it is as it has come to a phase, 0..1, by being heated: within 0.03 of a cosine's phase. */
-float spring_heated_at_c(const thermal_model_t *model, uint8_t spring, float phase);
-/* The model's phase, 0..1, where it is. */
-void spring_set_phase(thermal_model_t *model, uint8_t spring, float phase);
 /* What the model declares it to give off there, beside its neighbours as they are. */
 float spring_declared_w(const thermal_model_t *model, uint8_t spring, float temperature_c);
 /* Variance of the distance. */

@@ -204,18 +204,22 @@ static void take_another_circuit(spring_estimator_t *e, spring_belief_t *b,
     spring_note_read(e, k, step_ohm / own_ohm, b->noise);
 }
 
-/* What its resistance says to be austenite already takes up no latent heat any more, and what it
- * says to be none yet does. */
+/* What its resistance says to be austenite already takes up no latent heat any more. */
 static void take_phase(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                        uint8_t k)
 {
-    const spring_bounds_t phase = spring_estimator_austenite(e, model, k);
-    const uint16_t now = thermal_model_austenite(model, k);
-    if ((uint16_t)(phase.value * (float)THERMAL_MODEL_AUSTENITE_FULL) > now ||
-        (uint16_t)(phase.high * (float)THERMAL_MODEL_AUSTENITE_FULL) < now) {
-        spring_set_phase(model, k, phase.value);
-        b->seen = true; /* it is acted on in the next turn */
+    const float phase = spring_estimator_phase(e, model, k);
+    if ((uint16_t)(phase * (float)THERMAL_MODEL_AUSTENITE_FULL) <=
+        thermal_model_austenite(model, k)) {
+        return;
     }
+    const int16_t now_c7 = thermal_model_temperature_c7(model, k);
+    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
+    const float width_c7 = (float)(t.austenite_finish_c7 - t.austenite_start_c7);
+    const float reached_c = spring_c((int16_t)(t.austenite_start_c7 + (int16_t)(phase * width_c7)));
+    spring_set_temperature(model, k, reached_c, SPRING_PHASE_MARTENSITE);
+    thermal_model_set_temperature(model, k, now_c7);
+    b->seen = true; /* it is acted on in the next turn */
 }
 
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is

@@ -2,7 +2,7 @@
 
 #include "spring_estimator_internal.h"
 
-/* At a place of its transformation, with the phase that it reads. */
+/* At a place of its transformation. */
 static void see_level(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
                       spring_sight_kind_t kind, float seen_c, float sd_k)
 {
@@ -24,10 +24,13 @@ static void see_falling(spring_estimator_t *e, spring_belief_t *b, thermal_model
     }
 }
 
-/* It gains phase: it is on its way up, no colder than there. */
+/* It gains phase: it is on its way up, no colder than where it has come to what it surely has. */
 static void see_rising(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k)
 {
-    const float seen_c = spring_heated_at_c(model, k, spring_estimator_austenite(e, model, k).low);
+    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
+    const float width_k = spring_c((int16_t)(t.austenite_finish_c7 - t.austenite_start_c7));
+    const float seen_c =
+        spring_c(t.austenite_start_c7) + width_k * spring_estimator_austenite(e, model, k).low;
     b->lost = 0.0f;
     if (spring_now_c(model, k) < seen_c) {
         see_level(e, b, model, k, SPRING_SIGHT_ONSET, seen_c, SHIFT_SD_K);

@@ -420,14 +420,11 @@ TEST(heating_from_part_way_begins_with_the_phase_that_it_reads)
         uint8_t possible;
         double c, phase;
         bool reads;
-        double model_phase; /* then */
-        double was;         /* 0: as it is heated there */
+        double model_phase;
     } table[] = {
-        {B, 80.0, 0.8, true, 0.773, 0.0},  {B | A, 80.0, 0.8, true, 0.773, 0.0},
-        {B, 80.0, 1.0, true, 1.0, 0.0},    {B, 80.0, 0.8, false, 0.0, 0.0},
-        {M, 80.0, 0.8, true, 0.0, 0.0},    {B, 80.0, 0.0, true, 0.0, 0.0},
-        {B, 95.0, 0.6, true, 0.7939, 0.0}, {B, 84.0, 0.3, true, 0.327, 0.9},
-        {B, 84.0, 0.3, true, 0.478, 0.48}, {B, 84.0, 0.3, true, 0.327, 0.6},
+        {B, 80.0, 0.8, true, 0.905},  {B | A, 80.0, 0.8, true, 0.905}, {B, 80.0, 1.0, true, 1.0},
+        {B, 80.0, 0.8, false, 0.0},   {M, 80.0, 0.8, true, 0.0},       {B, 80.0, 0.0, true, 0.0},
+        {B, 95.0, 0.3, true, 0.4218},
     };
     for (size_t n = 0; n < ROWS(table); n++) {
         begin_heating_at(table[n].c, table[n].possible, 14.0);
@@ -438,11 +435,8 @@ TEST(heating_from_part_way_begins_with_the_phase_that_it_reads)
         INSIDE.learnt.austenite_ohm = 0.25f;
         INSIDE.learnt.change = 0.2f;
         INSIDE.phase_ohm = (float)(0.25 * (1.0 - 0.2 * (1.0 - table[n].phase)));
-        if (table[n].was > 0.0) {
-            spring_set_phase(&model, 0, (float)table[n].was);
-        }
         const double was = thermal_model_austenite(&model, 0) / 32768.0;
-        const bool more = fabs(table[n].model_phase - was) > 0.01;
+        const bool more = table[n].model_phase > was + 0.001;
         spring_heating_watch(&estimator, &INSIDE, &model, 0);
         TEST_ASSERT_FLOAT_WITHIN(0.003f, (float)(more ? table[n].model_phase : was),
                                  (float)thermal_model_austenite(&model, 0) / 32768.0f);
@@ -1271,11 +1265,6 @@ static void begin_level_at(double c, double more)
     INSIDE.lost = 0.1f;
 }
 
-static double model_phase(void)
-{
-    return thermal_model_austenite(&model, 0) / 32768.0;
-}
-
 /* On its way down it is no hotter than where it has lost so much, on its way up no colder than
  * where it has gained what it surely reads; by one update, and with the phase that it reads. As it
  * cools it gains none, nor where an intermediate phase is likely. */
@@ -1290,8 +1279,8 @@ TEST(what_a_level_loses_or_gains_tells_its_branch)
         {84.0, -0.01, -2.0, 1.0, SPRING_SIGHT_LOST, 0.15, 75.521, 1.0},
         {84.0, -0.0013, 0.0, -2.2, SPRING_SIGHT_LOST, 0.1065, 75.911, 1.0},
         {75.0, -0.01, 0.0, -2.2, SPRING_SIGHT_LOST, 0.15, 0.0, 0.0},
-        {84.0, 0.01, 0.0, -2.2, SPRING_SIGHT_ONSET, 0.0, 93.75, 3.0},
-        {84.0, 0.01, 0.1, -2.2, SPRING_SIGHT_ONSET, 0.0, 93.75, 3.0},
+        {84.0, 0.01, 0.0, -2.2, SPRING_SIGHT_ONSET, 0.0, 94.387, 3.0},
+        {84.0, 0.01, 0.1, -2.2, SPRING_SIGHT_ONSET, 0.0, 94.387, 3.0},
         {95.0, 0.01, 0.0, -2.2, SPRING_SIGHT_ONSET, 0.0, 0.0, 0.0},
         {84.0, 0.01, -0.1, -2.2, SPRING_SIGHT_ONSET, 0.1, 0.0, 0.0},
         {84.0, 0.01, 0.0, 0.1, SPRING_SIGHT_ONSET, 0.1, 0.0, 0.0},
@@ -1313,9 +1302,6 @@ TEST(what_a_level_loses_or_gains_tells_its_branch)
         if (seen_c > 0.0) {
             TEST_ASSERT_EQUAL_UINT8(table[n].kind, sight()->kind);
             TEST_ASSERT_INT_WITHIN(1, lround(1e4 * table[n].more), sight()->read);
-            TEST_ASSERT_FLOAT_WITHIN(0.05f,
-                                     (float)(1.0 - (1.0 - 0.96 * (1.0 + table[n].more)) / 0.2),
-                                     (float)model_phase());
         }
         const bool anew = fabs(table[n].more) > 0.0012;
         NEAR(anew ? 0.24 * (1.0 + table[n].more) : 0.24, INSIDE.run.line.ohm);
