@@ -11,30 +11,35 @@ static void see_level(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
     spring_note(e, model, k, kind, &before, seen_c, sd_k);
 }
 
-/* It loses phase: it is on its way down, no hotter than there. */
-static void see_falling(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
+/* It loses phase: it is on its way down, no hotter than there. Returns whether that moved it. */
+static bool see_falling(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                         uint8_t k, float lost, float lost_sd)
 {
     b->lost = fminf(b->lost + lost, 1.0f);
     const float seen_c = spring_lost_at_c(model, k, b->lost);
     const float unsure_k = seen_c - spring_lost_at_c(model, k, b->lost + lost_sd);
-    if (spring_now_c(model, k) > seen_c) {
-        see_level(e, b, model, k, SPRING_SIGHT_LOST, seen_c,
-                  sqrtf(CROSSING_SD_K * CROSSING_SD_K + unsure_k * unsure_k));
+    if (spring_now_c(model, k) <= seen_c) {
+        return false;
     }
+    see_level(e, b, model, k, SPRING_SIGHT_LOST, seen_c,
+              sqrtf(CROSSING_SD_K * CROSSING_SD_K + unsure_k * unsure_k));
+    return true;
 }
 
-/* It gains phase: it is on its way up, no colder than where it has come to what it surely has. */
-static void see_rising(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k)
+/* It gains phase: it is on its way up, no colder than where it has come to what it surely has.
+ * Returns whether that moved it. */
+static bool see_rising(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k)
 {
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const float width_k = spring_c((int16_t)(t.austenite_finish_c7 - t.austenite_start_c7));
     const float seen_c =
         spring_c(t.austenite_start_c7) + width_k * spring_estimator_austenite(e, model, k).low;
     b->lost = 0.0f;
-    if (spring_now_c(model, k) < seen_c) {
-        see_level(e, b, model, k, SPRING_SIGHT_ONSET, seen_c, SHIFT_SD_K);
+    if (spring_now_c(model, k) >= seen_c) {
+        return false;
     }
+    see_level(e, b, model, k, SPRING_SIGHT_ONSET, seen_c, SHIFT_SD_K);
+    return true;
 }
 
 void spring_level_watch(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
@@ -77,12 +82,10 @@ void spring_level_watch(spring_estimator_t *e, spring_belief_t *b, thermal_model
         spring_begin_line(b, true, share);
         return;
     }
-    if (rises) {
-        see_rising(e, b, model, k);
-    } else {
-        const float per_change = 1.0f / fabsf(b->learnt.change);
-        see_falling(e, b, model, k, fabsf(left) * per_change, d.unsure * per_change);
+    const float per_change = 1.0f / fabsf(b->learnt.change);
+    if (rises ? see_rising(e, b, model, k)
+              : see_falling(e, b, model, k, fabsf(left) * per_change, d.unsure * per_change)) {
+        spring_note_read(e, k, left, sqrtf(d.noise2 + d.unsure * d.unsure));
     }
-    spring_note_read(e, k, left, sqrtf(d.noise2 + d.unsure * d.unsure));
     spring_begin_line(b, true, share);
 }

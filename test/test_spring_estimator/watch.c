@@ -1302,6 +1302,8 @@ TEST(what_a_level_loses_or_gains_tells_its_branch)
         if (seen_c > 0.0) {
             TEST_ASSERT_EQUAL_UINT8(table[n].kind, sight()->kind);
             TEST_ASSERT_INT_WITHIN(1, lround(1e4 * table[n].more), sight()->read);
+        } else { /* no sight: what was read of the one before stands */
+            TEST_ASSERT_EQUAL_INT(0, sight()->read);
         }
         const bool anew = fabs(table[n].more) > 0.0012;
         NEAR(anew ? 0.24 * (1.0 + table[n].more) : 0.24, INSIDE.run.line.ohm);
