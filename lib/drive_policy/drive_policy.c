@@ -340,6 +340,13 @@ static bool is_there(const drive_policy_input_t *in, uint8_t k, uint16_t level_p
     return phase_of(in, k) >= level - LEVEL_BAND;
 }
 
+/* A spring that was never seen fully on is heated there before it comes to a level, once: what it
+ * reads at one is told by what it read then. */
+static uint16_t heats_to(const drive_policy_input_t *in, uint8_t k, uint16_t level_permille)
+{
+    return spring_estimator_untried(in->belief, k) ? DRIVE_POLICY_LEVEL_FULL : level_permille;
+}
+
 static void precompensate(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k,
                           uint16_t level_permille)
 {
@@ -356,7 +363,7 @@ static void precompensate(drive_policy_t *policy, const drive_policy_input_t *in
               level_permille);
         break;
     case DRIVE_POLICY_STAGE_HEAT:
-        heat(policy, in, k, level_permille);
+        heat(policy, in, k, heats_to(in, k, level_permille));
         break;
     case DRIVE_POLICY_STAGE_HOLD:
         hold(policy, in, k, level_permille);

@@ -126,24 +126,25 @@ typedef struct {
     uint8_t averaged;   /* turns in slow_ohm, saturating */
     uint16_t unsteady;  /* turns, of all that a contact or the sensor has jumped lately */
     /* bits: of nine springs they are a good part of the RAM that is spare */
-    bool unproven : 1; /* since its heating its contact came and went: what it seemed to gain may
-                        * have been that */
-    bool odd : 1;      /* the turn before read what no phase changes to so fast */
-    bool reads : 1;    /* the last turn had readings fit for use */
-    bool unread : 1;   /* a turn without them lies before those that it goes by */
-    bool anew : 1;     /* the last turn has found it changed by itself, and began it anew */
-    bool seen : 1;     /* the last turn has moved it to where it was seen */
-    bool blind : 1;    /* a heating that must have transformed it did not show */
-    bool heating : 1;  /* between spring_estimator_begin_heating and _begin_hold */
-    bool onset : 1;    /* this heating was seen to begin to transform it */
-    bool rough : 1;    /* the line is of few turns, not of a spring at rest */
-    bool steep : 1;    /* and its resistance still changes as only that explains */
-    bool changes : 1;  /* so it does, whether its beginning was seen or not */
-    bool untested : 1; /* as it began nothing was known, or someone said that it is martensite;
-                        * what it reads has not been compared with what was learnt since */
-    bool trial : 1;    /* held with less power, to tell what its resistance has changed by */
-    bool hot : 1;      /* in its hold it reads beyond what its austenite read when that was hot */
-    bool unlike : 1;   /* this heating's martensite was not of the declared resistance */
+    bool unproven : 1;  /* since its heating its contact came and went: what it seemed to gain may
+                         * have been that */
+    bool odd : 1;       /* the turn before read what no phase changes to so fast */
+    bool reads : 1;     /* the last turn had readings fit for use */
+    bool unread : 1;    /* a turn without them lies before those that it goes by */
+    bool anew : 1;      /* the last turn has found it changed by itself, and began it anew */
+    bool seen : 1;      /* the last turn has moved it to where it was seen */
+    bool blind : 1;     /* a heating that must have transformed it did not show */
+    bool heating : 1;   /* between spring_estimator_begin_heating and _begin_hold */
+    bool onset : 1;     /* this heating was seen to begin to transform it */
+    bool rough : 1;     /* the line is of few turns, not of a spring at rest */
+    bool steep : 1;     /* and its resistance still changes as only that explains */
+    bool changes : 1;   /* so it does, whether its beginning was seen or not */
+    bool untested : 1;  /* as it began nothing was known, or someone said that it is martensite;
+                         * what it reads has not been compared with what was learnt since */
+    bool trial : 1;     /* held with less power, to tell what its resistance has changed by */
+    bool hot : 1;       /* in its hold it reads beyond what its austenite read when that was hot */
+    bool from_full : 1; /* this heating began fully on */
+    bool unlike : 1;    /* this heating's martensite was not of the declared resistance */
     spring_learnt_t learnt;
 
     float current_a; /* of the last turn that had readings */
@@ -326,6 +327,12 @@ static inline bool spring_estimator_may_look(const spring_estimator_t *estimator
 {
     const spring_belief_t *const belief = &estimator->spring[spring];
     return belief->untested && belief->learnt.austenite_ohm > 0.0f && estimator->observes;
+}
+/* It was never fully on, to be seen, and nothing says yet that it does not show. */
+static inline bool spring_estimator_untried(const spring_estimator_t *estimator, uint8_t spring)
+{
+    const spring_belief_t *const belief = &estimator->spring[spring];
+    return belief->learnt.austenite_ohm == 0.0f && !belief->blind && estimator->observes;
 }
 /* The heating has fully transformed it: seen, or as hot as it takes whatever it reads. */
 bool spring_estimator_has_transformed(const spring_estimator_t *estimator,

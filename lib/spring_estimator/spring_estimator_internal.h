@@ -229,8 +229,8 @@ void spring_heating_watch(spring_estimator_t *estimator, spring_belief_t *belief
  * in the average is that of its readings. */
 void spring_holding_watch(spring_estimator_t *estimator, spring_belief_t *belief,
                           thermal_model_t *model, uint8_t spring, float moved_k, float share);
-/* The same between the phases, on its way to a level or held there: what it gains or loses tells on
- * which branch of its hysteresis it is. */
+/* The same between the phases, on its way to a level or held there: what it loses tells that it is
+ * no hotter than that. */
 void spring_level_watch(spring_estimator_t *estimator, spring_belief_t *belief,
                         thermal_model_t *model, uint8_t spring, float moved_k, float share);
 

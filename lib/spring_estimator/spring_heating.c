@@ -23,7 +23,8 @@
 void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
-    if (b->possible == SPRING_PHASE_AUSTENITE) {
+    b->from_full = b->possible == SPRING_PHASE_AUSTENITE;
+    if (b->from_full) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
     }
     b->run.heat = (spring_heat_t){
@@ -131,9 +132,9 @@ static void hold_back(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
     if (thermal_model_temperature_c7(model, k) <= limit_c7) {
         return;
     }
-    /* after a look its temperature is a guess; once its transformation was seen, it is known, but
-     * for what the surroundings have done since */
-    const bool guess = b->shift_variance_k2 >= SHIFT_SD_K * SHIFT_SD_K;
+    /* after a look, or at a level, its temperature is a guess; once its transformation was seen, it
+     * is known, but for what the surroundings have done since */
+    const bool guess = !b->from_full || b->shift_variance_k2 >= SHIFT_SD_K * SHIFT_SD_K;
     const bool waits = martensite || ((b->onset ? b->run.heat.flat_k < FLAT_K : guess) &&
                                       spring_estimator_lacks_phase(b, model, k));
     const bool shows = b->steep || (b->learnt.austenite_ohm > 0.0f && !b->blind && waits);
@@ -156,11 +157,14 @@ static bool may_transform(const spring_belief_t *b, const thermal_model_t *model
 }
 
 /* It changes no more, in more heat than the last of its change may hide in; and what it changed by
- * since its onset was no contact's step: it went on, as only a transformation does, and shows. */
-static bool is_over(const spring_belief_t *b, float unseen_k)
+ * since its onset was no contact's step: it went on, as only a transformation does, and shows. From
+ * a level it may only have to wait for its ends, and still reads that. */
+static bool is_over(const spring_belief_t *b, const thermal_model_t *model, uint8_t k,
+                    float unseen_k)
 {
+    const bool waits = !b->from_full && spring_estimator_lacks_phase(b, model, k);
     const bool grown = b->run.heat.cold_ohm == 0.0f || fabsf(b->run.heat.excess) > EXCESS_SEEN;
-    return b->run.heat.flat_k >= FLAT_K + unseen_k && grown &&
+    return b->run.heat.flat_k >= FLAT_K + unseen_k && grown && !waits &&
            fabsf(b->ohm / b->run.heat.onset_ohm - 1.0f) > EXCESS_SEEN;
 }
 
@@ -292,7 +296,7 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
                                       : b->ohm / b->run.heat.onset_ohm - 1.0f;
         const float unseen_k = spring_clamp(FLAT_CHANGE_K / (fabsf(change_seen) + 0.001f) - FLAT_K,
                                             0.0f, SHIFT_BOUND_K);
-        if (is_over(b, unseen_k)) {
+        if (is_over(b, model, k, unseen_k)) {
             see_finish(e, b, model, k, b->run.heat.flat_k - unseen_k);
             spring_note_read(e, k, change, b->noise);
         }

@@ -341,6 +341,42 @@ TEST(heating_slows_to_a_level_and_keeps_what_waits)
     TEST_ASSERT_EQUAL_UINT16(BOOST_MA, policy.spring[0].wanted_ma);
 }
 
+/* What was never fully on goes there first, with the boost, and from there to its level: but what
+ * shows nothing, or is not read, never would have been. */
+TEST(level_of_what_was_never_fully_on_is_reached_from_there)
+{
+    static const struct {
+        bool learnt, blind, observes;
+        drive_policy_stage_t stage;
+    } table[] = {{true, false, true, HOLD},
+                 {false, false, true, HEAT},
+                 {false, true, true, HOLD},
+                 {false, false, false, HOLD}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin(1, 2);
+        believed(0, 95.0f, B, 1.0f);
+        thermal_model_set_temperature(&model, 0, 128 * 99);
+        thermal_model_set_temperature(&model, 0, 128 * 95);
+        of(0)->learnt.austenite_ohm = table[n].learnt ? 0.25f : 0.0f;
+        of(0)->blind = table[n].blind;
+        spring_estimator_prepare(&belief, &model, table[n].observes);
+        stands(0, HEAT, 500);
+        turn_of(0);
+        row(n);
+        TEST_ASSERT_EQUAL(table[n].stage, drive_policy_stage(&policy, 0));
+        if (table[n].stage == HEAT) {
+            TEST_ASSERT_EQUAL_UINT16(BOOST_MA, policy.spring[0].wanted_ma);
+        }
+    }
+    begin(1, 2); /* there: it is known, held, and comes down */
+    believed(0, 100.0f, A, 1.0f);
+    stands(0, HEAT, 500);
+    turn_of(0);
+    TEST_ASSERT_EQUAL(HOLD, drive_policy_stage(&policy, 0));
+    turn_of(0);
+    TEST_ASSERT_EQUAL(LOWER, drive_policy_stage(&policy, 0));
+}
+
 /* Nothing is known: it waits and says so, or looks with 2 A, where its own numbers would tell and
  * have not been asked: from its first turn on, whether it is asked for now or heats already. */
 TEST(what_is_not_known_waits_or_looks)

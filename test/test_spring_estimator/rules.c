@@ -124,6 +124,28 @@ TEST(heating_is_over_where_its_austenite_is_read_twice)
     TEST_ASSERT_TRUE(INSIDE.changes); /* nothing is known of that yet */
 }
 
+/* As it begins it has its phase for certain, or does not, at a level or lowered to one. */
+TEST(heating_begins_fully_on_or_not)
+{
+    static const struct {
+        uint8_t possible, then;
+        bool from_full;
+    } table[] = {{SPRING_PHASE_AUSTENITE, SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE, true},
+                 {SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE,
+                  SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE, false},
+                 {SPRING_PHASE_BETWEEN, SPRING_PHASE_BETWEEN, false},
+                 {SPRING_PHASE_MARTENSITE, SPRING_PHASE_MARTENSITE, false}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_cold();
+        row(n);
+        INSIDE.possible = table[n].possible;
+        INSIDE.from_full = !table[n].from_full;
+        spring_estimator_begin_heating(&estimator, &model, 0);
+        TEST_ASSERT_EQUAL_UINT8(table[n].then, INSIDE.possible);
+        TEST_ASSERT_EQUAL(table[n].from_full, INSIDE.from_full);
+    }
+}
+
 /* ---- what all springs share ---- */
 
 /* One alloy in ten has one. Without it three sights of four lose phase straight away; three to the
