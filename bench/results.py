@@ -70,13 +70,13 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "swarm",
         "Worlds that nobody listed: everything drawn at once",
-        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2915",
+        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2916",
         markdown=True,
     ),
     Section(
         "swarm_knows",
         "The same, driven by whoever knows all that is true",
-        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2915 --knows",
+        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2916 --knows",
         markdown=True,
     ),
     Section(
@@ -87,7 +87,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "lies",
         "A sensor that begins to lie, or a supply that moves",
-        f"{PYTHON} bench/lies/lies.py --runs 4000 --seed 7103",
+        f"{PYTHON} bench/lies/lies.py --runs 4000 --seed 7104",
     ),
     Section("flips", "Bits that turn over", f"{HOST}/bench/swarm/bench_flips --runs 50 --boards 40 --seed 8001"),
     Section("mutate", "What the tests notice", "script/mutate"),
