@@ -335,6 +335,9 @@ TEST(hottest_possible_cools_by_the_least_loss_with_its_latent_heat)
         TEST_ASSERT_EQUAL_FLOAT(1.0f, any.high);
         /* it lacks no contact: none is declared, whatever it reads */
         TEST_ASSERT_FALSE(spring_estimator_lacks_contact(&estimator, &model, 0));
+        model.parameters.contact_uohm[0] = 950000; /* nor where nothing was read */
+        TEST_ASSERT_FALSE(spring_estimator_lacks_contact(&estimator, &model, 0));
+        model.parameters.contact_uohm[0] = 0;
         NEAR(pow(0.29 * ((double)SPRING_ESTIMATOR_HOTTEST_C - 20.0) + 5.0, 2) + 9.0,
              INSIDE.variance_k2);
         INSIDE.hottest_c = (float)c;

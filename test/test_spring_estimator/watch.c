@@ -251,6 +251,25 @@ TEST(what_no_phase_does_so_fast_is_a_jump)
     }
 }
 
+/* A hold that has no line yet has nothing to jump from. */
+TEST(nothing_jumps_before_its_line_begins)
+{
+    for (int line = 0; line < 2; line++) {
+        begin_cold();
+        INSIDE.possible = A;
+        INSIDE.run.line = (spring_line_t){.ohm = line != 0 ? 0.25f : 0.0f, .a = 2.0f};
+        INSIDE.slow_ohm = 0.25f;
+        INSIDE.current_a = 2.0f;
+        INSIDE.averaged = 16;
+        INSIDE.noise = 0.002f;
+        INSIDE.offset_sd_v = 0.0f;
+        INSIDE.fresh = 9;
+        give(2.0, 0.3);
+        (void)spring_take_readings(&estimator, &model, 0);
+        TEST_ASSERT_EQUAL(line != 0, INSIDE.odd);
+    }
+}
+
 /* ---- a heating ---- */
 
 static void begin_heating_at(double c, uint8_t possible, double heat_k)
@@ -589,6 +608,7 @@ TEST(martensite_that_reads_otherwise_than_its_own_is_of_another_circuit)
         NEAR(table[n].by * table[n].was_ohm, INSIDE.learnt.martensite_ohm);
         NEAR(table[n].by * 0.2, INSIDE.learnt.austenite_ohm);
         TEST_ASSERT_EQUAL(table[n].by != 1.0, sight()->kind == SPRING_SIGHT_JUMPED);
+        TEST_ASSERT_INT_WITHIN(1, lround(1e4 * (table[n].by - 1.0)), sight()->read);
     }
 }
 
@@ -726,6 +746,19 @@ TEST(phase_is_lost_where_nothing_else_explains_what_is_read)
             TEST_ASSERT_TRUE(INSIDE.rough);
             NEAR(0.25 * (1.0 - table[n].less), INSIDE.run.line.ohm);
         }
+    }
+}
+
+/* Its distance is known to 2 K: by so much its slope may have moved what it reads. */
+TEST(what_an_unseen_temperature_makes_of_a_slope_is_no_lost_phase)
+{
+    for (int beyond = 0; beyond < 2; beyond++) {
+        begin_line_at(0.25 * (1.0 - (beyond != 0 ? 0.0021 : 0.0019)));
+        INSIDE.learnt.slow_noise = 0.0f;
+        INSIDE.run.line.rise_per_k = 0.001f;
+        spring_holding_watch(&estimator, &INSIDE, &model, 0, 0.0f, 0.0625f);
+        TEST_ASSERT_EQUAL(beyond != 0, INSIDE.lost > 0.0f);
+        TEST_ASSERT_EQUAL_UINT8(beyond != 0 ? 0 : 1, INSIDE.losing);
     }
 }
 
@@ -998,6 +1031,11 @@ TEST(contact_that_crept_is_told_by_what_was_read_before_phase_was_lost)
     }
 }
 
+/* The line of 0.25 ohm has moved by so much of it: some millionths in a turn. */
+#define FOLLOWS(by)                                                                                \
+    TEST_ASSERT_FLOAT_WITHIN(0.15f, (float)(1e6 * (by)),                                           \
+                             1e6f * (INSIDE.run.line.ohm / 0.25f - 1.0f))
+
 /* It keeps its phase: the line follows in 60 s, tells its slope from 1 K on, and the spring is no
  * colder than half a kelvin below where its loss would be seen. */
 TEST(line_follows_what_keeps_its_phase)
@@ -1024,7 +1062,7 @@ TEST(line_follows_what_keeps_its_phase)
                       (prior * table[n].slow_k * table[n].slow_k + 32.0 * 0.0012 * 0.0012)
                 : 0.0;
         spring_holding_watch(&estimator, &INSIDE, &model, 0, 0.0f, 0.0625f);
-        NEAR(0.25 * (1.0 + table[n].more * share), INSIDE.run.line.ohm);
+        FOLLOWS(table[n].more * share);
         NEAR(1e3 * gain * table[n].more, 1e3f * INSIDE.run.line.rise_per_k);
         NEAR(1e3 * sqrt(prior * (1.0 - gain * table[n].slow_k)),
              1e3f * INSIDE.run.line.rise_sd_per_k);
@@ -1068,7 +1106,7 @@ TEST(what_a_known_slope_reads_is_a_temperature)
         NEAR(1e6 * -1e-4 * hotter_k, 1e6f * INSIDE.learnt.loss_w_per_k);
         NEAR(hotter_k, INSIDE.run.line.way_k);
         NEAR(hotter_k, INSIDE.run.line.slow_k);
-        NEAR(0.25 * (1.0 + table[n].more * (1.0 - per_step * step) / 240.0), INSIDE.run.line.ohm);
+        FOLLOWS(table[n].more * (1.0 - per_step * step) / 240.0);
     }
 }
 
