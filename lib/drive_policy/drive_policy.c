@@ -195,15 +195,6 @@ static bool waits_for_supply(const drive_policy_spring_t *s)
     return s->granted_ma < s->wanted_ma - (s->wanted_ma >> 2);
 }
 
-/* Its own limit leaves too little to go on, and it is hot enough to have transformed. */
-static bool is_limited(const drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k)
-{
-    const uint16_t boost_ma = policy->parameters.boost_current_ma;
-    return policy->spring[k].ceiling_ma < boost_ma - (boost_ma >> 2) &&
-           thermal_model_temperature_c7(in->model, k) >
-               thermal_model_transformation(in->model, k).austenite_finish_c7;
-}
-
 /* Its own limit leaves it where it is: it would wait there for ever. */
 static bool is_stalled(const drive_policy_spring_t *s)
 {
@@ -226,8 +217,8 @@ static void heat(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
     const bool full = is_full(level_permille);
     const float level = 0.001f * (float)level_permille;
     const bool waits = waits_for_supply(s);
-    const bool ends = is_limited(policy, in, k) || is_stalled(s) ||
-                      (full && spring_estimator_has_transformed(in->belief, in->model, k));
+    const bool ends =
+        is_stalled(s) || (full && spring_estimator_has_transformed(in->belief, in->model, k));
     const bool asks = !full || s->partly || waits; /* as a rule not, and once */
     const float phase = !ends && asks ? phase_of(in, k) : 0.0f;
     if (ends || (!full && phase >= level)) {

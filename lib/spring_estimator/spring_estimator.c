@@ -513,13 +513,22 @@ void spring_estimator_tick(spring_estimator_t *e, thermal_model_t *model,
 
 /* ---- stages ---- */
 
+/* What ohm is compared with: its austenite's. What a heating took for a contact's jump may have
+ * been phase: until it ends, the one without that is kept beside it, and the nearer one counts. */
+static float austenite_ohm(const spring_belief_t *b, float ohm)
+{
+    const float learnt_ohm = b->learnt.austenite_ohm;
+    const float was_ohm = b->heating ? b->run.heat.was_ohm : 0.0f;
+    return was_ohm > 0.0f && fabsf(ohm - was_ohm) < fabsf(ohm - learnt_ohm) ? was_ohm : learnt_ohm;
+}
+
 float spring_beyond_austenite(const spring_belief_t *b, const thermal_model_t *model, uint8_t k,
                               float ohm)
 {
     const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
     const float hotter_k = spring_now_c(model, k) - spring_c(finish_c7);
     const float explains = COEFFICIENT_MOST_PER_K * hotter_k;
-    const float more = ohm / b->learnt.austenite_ohm - 1.0f;
+    const float more = ohm / austenite_ohm(b, ohm) - 1.0f;
     const float low = fminf(explains, 0.0f);
     const float high = fmaxf(explains, 0.0f);
     return more > high ? more - high : more < low ? more - low : 0.0f;
@@ -567,7 +576,7 @@ static bool reads_austenite(const spring_belief_t *b, const thermal_model_t *mod
     const float ohm = 0.5f * (b->ohm_before[0] + b->ohm_before[1]);
     const float beyond = spring_beyond_austenite(b, model, k, ohm);
     return fabsf(beyond) < spring_read_tolerance(b) &&
-           (l->change > 0.0f ? ohm > l->austenite_ohm : beyond < 0.0f);
+           (l->change > 0.0f ? ohm > austenite_ohm(b, ohm) : beyond < 0.0f);
 }
 
 bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal_model_t *model,

@@ -181,7 +181,8 @@ float spring_martensite_ohm(const spring_belief_t *belief, const thermal_model_t
 void spring_misread(spring_estimator_t *estimator, const thermal_model_t *model, uint8_t spring,
                     float by, float noise);
 /* By so much, of its austenite's, ohm is beyond what it read when it had transformed last (below 0:
- * less). 0 where as much as being hotter or colder makes of that explains it. */
+ * less). 0 where as much as being hotter or colder makes of that explains it. While it is
+ * heated, with what seemed to jump since that began or without, whichever is nearer. */
 float spring_beyond_austenite(const spring_belief_t *belief, const thermal_model_t *model,
                               uint8_t spring, float ohm);
 /* By how much of it a turn's resistance may be off, with nothing happening. */
@@ -221,6 +222,12 @@ spring_departure_t spring_departs(spring_belief_t *belief, const thermal_model_t
                                   float share);
 /* Where it is on its way down, having lost so much of its phase. */
 float spring_lost_at_c(const thermal_model_t *model, uint8_t spring, float lost);
+typedef struct {
+    float c, sd_k;
+} spring_place_t;
+/* The same, with its standard deviation. */
+spring_place_t spring_place_of(const thermal_model_t *model, uint8_t spring, float lost,
+                               float lost_sd);
 
 /* While it heats: what heat does to its resistance. */
 void spring_heating_watch(spring_estimator_t *estimator, spring_belief_t *belief,

@@ -29,6 +29,7 @@ void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t
     }
     b->run.heat = (spring_heat_t){
         .begun_c = spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b),
+        .was_ohm = b->learnt.austenite_ohm,
     };
     b->onset = b->steep = b->unlike = false;
     b->changes = true; /* until a step of heat shows that it rests */

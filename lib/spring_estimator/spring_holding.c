@@ -27,14 +27,12 @@ __attribute__((noinline)) static void see_crossing(spring_estimator_t *e, spring
     const spring_before_t before = spring_before(b, model, k);
     const bool searched = spring_estimator_sd_k(b) > 3.0f * CROSSING_SD_K;
     b->lost = fminf(b->lost + lost, 1.0f);
-    const float seen_c = spring_lost_at_c(model, k, b->lost);
-    const float unsure_k = seen_c - spring_lost_at_c(model, k, b->lost + lost_sd);
-    const float sd_k = sqrtf(CROSSING_SD_K * CROSSING_SD_K + unsure_k * unsure_k);
-    const bool opened = spring_open_to_step(e, b, k, seen_c - spring_now_c(model, k), sd_k);
-    const float error_k = spring_see(e, b, model, k, seen_c, sd_k, SPRING_PHASE_AUSTENITE);
+    const spring_place_t at = spring_place_of(model, k, b->lost, lost_sd);
+    const bool opened = spring_open_to_step(e, b, k, at.c - spring_now_c(model, k), at.sd_k);
+    const float error_k = spring_see(e, b, model, k, at.c, at.sd_k, SPRING_PHASE_AUSTENITE);
     b->gone_k -= error_k;
     b->gone_w_per_k += b->learnt.loss_w_per_k - before.loss_w_per_k;
-    spring_note(e, model, k, SPRING_SIGHT_LOST, &before, seen_c, sd_k);
+    spring_note(e, model, k, SPRING_SIGHT_LOST, &before, at.c, at.sd_k);
     spring_note_did(e, k, opened ? SPRING_DID_OPEN : 0);
     if (!searched && -error_k > b->disturbance_k) {
         b->disturbance_k = -error_k;

@@ -9,14 +9,12 @@ static void see_falling(spring_estimator_t *e, spring_belief_t *b, thermal_model
     const float per_change = 1.0f / fabsf(b->learnt.change);
     const spring_before_t before = spring_before(b, model, k);
     b->lost = fminf(b->lost + fabsf(left) * per_change, 1.0f);
-    const float seen_c = spring_lost_at_c(model, k, b->lost);
-    if (spring_now_c(model, k) <= seen_c) {
+    const spring_place_t at = spring_place_of(model, k, b->lost, d->unsure * per_change);
+    if (spring_now_c(model, k) <= at.c) {
         return;
     }
-    const float unsure_k = seen_c - spring_lost_at_c(model, k, b->lost + d->unsure * per_change);
-    const float sd_k = sqrtf(CROSSING_SD_K * CROSSING_SD_K + unsure_k * unsure_k);
-    (void)spring_see(e, b, model, k, seen_c, sd_k, SPRING_PHASE_AUSTENITE);
-    spring_note(e, model, k, SPRING_SIGHT_LOST, &before, seen_c, sd_k);
+    (void)spring_see(e, b, model, k, at.c, at.sd_k, SPRING_PHASE_AUSTENITE);
+    spring_note(e, model, k, SPRING_SIGHT_LOST, &before, at.c, at.sd_k);
     spring_note_read(e, k, left, sqrtf(d->noise2 + d->unsure * d->unsure));
 }
 

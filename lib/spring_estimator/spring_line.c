@@ -18,6 +18,13 @@ float spring_lost_at_c(const thermal_model_t *model, uint8_t k, float lost)
     return spring_c(t.martensite_start_c7) - width_k * depth;
 }
 
+spring_place_t spring_place_of(const thermal_model_t *model, uint8_t k, float lost, float lost_sd)
+{
+    const float seen_c = spring_lost_at_c(model, k, lost);
+    const float unsure_k = seen_c - spring_lost_at_c(model, k, lost + lost_sd);
+    return (spring_place_t){seen_c, sqrtf(CROSSING_SD_K * CROSSING_SD_K + unsure_k * unsure_k)};
+}
+
 /* Of its resistance, what its sensor's steps may make as long as they like. Where it may have come
  * to where it loses phase, that is likelier. */
 static float coarse_share(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)

@@ -124,6 +124,37 @@ TEST(heating_is_over_where_its_austenite_is_read_twice)
     TEST_ASSERT_TRUE(INSIDE.changes); /* nothing is known of that yet */
 }
 
+/* What a heating took for a contact's jump may have been phase: at what its austenite read before,
+ * too, none is missing. Another heating begins with what is learnt by then. */
+TEST(jump_of_a_heating_leaves_what_its_austenite_read_before)
+{
+    static const struct {
+        float change, by, ohm;
+        bool lacks, over;
+    } table[] = {
+        {0.2f, 1.1f, 0.2003f, false, true}, {0.2f, 1.1f, 0.1999f, false, false},
+        {0.2f, 1.1f, 0.198f, true, false},  {0.2f, 1.1f, 0.207f, false, false},
+        {0.2f, 1.1f, 0.212f, true, false},  {0.2f, 1.1f, 0.2203f, false, true},
+        {0.2f, 0.9f, 0.2003f, false, true}, {0.2f, 0.9f, 0.178f, true, false},
+        {0.2f, 0.9f, 0.1803f, false, true}, {-0.2f, 1.1f, 0.1985f, false, true},
+        {-0.2f, 1.1f, 0.208f, true, false}, {-0.2f, 1.1f, 0.2185f, false, true},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        row(n);
+        begin_heated(89.0f, table[n].change, table[n].ohm);
+        spring_estimator_begin_heating(&estimator, &model, 0);
+        spring_jump(&INSIDE, table[n].by);
+        INSIDE.ohm_before[0] = INSIDE.ohm_before[1] = table[n].ohm;
+        INSIDE.changes = false;
+        /* where it may be colder than its finish, a coefficient explains some of what is less */
+        thermal_model_set_temperature(&model, 0, 97 * 128);
+        TEST_ASSERT_EQUAL(table[n].lacks, spring_estimator_lacks_phase(&INSIDE, &model, 0));
+        TEST_ASSERT_EQUAL(table[n].over, spring_estimator_has_transformed(&estimator, &model, 0));
+        spring_estimator_begin_heating(&estimator, &model, 0);
+        TEST_ASSERT_FLOAT_WITHIN(1e-5f, 0.2f * table[n].by, INSIDE.run.heat.was_ohm);
+    }
+}
+
 /* As it begins it has its phase for certain, or does not, at a level or lowered to one. */
 TEST(heating_begins_fully_on_or_not)
 {
