@@ -381,7 +381,7 @@ ISR(USART0_RX_vect)
     if (octet == '!') {
         outputs_off();
         stop_pending = true;
-        stop_received = last_octet == '!' ? 2u : 1u;
+        stop_received = last_octet == '!' || stop_received > 1u ? 2u : 1u; /* two stay two */
         last_octet = octet;
         stop_head = receive_head;
         stop_queued = true;

@@ -141,7 +141,8 @@ static void keep_model(void)
     kept.known = controller_is_known(&controller);
     kept.mismatched = 0;
     for (uint8_t k = 0; k < controller_springs(&controller); k++) {
-        if (controller_fault(&controller, k) == SAFETY_FAULT_SENSOR_MISMATCH) {
+        if (controller_fault(&controller, k) == SAFETY_FAULT_SENSOR_MISMATCH ||
+            controller_is_mistrusted(&controller, k)) {
             kept.mismatched |= (uint16_t)(1u << k);
         }
     }
@@ -310,11 +311,12 @@ OWN_FRAME static void take_input(void)
         if (octet < 0) {
             return;
         }
-        if (obsolete) {
+        const bool ends = octet == '\n' || octet == '\r';
+        if (obsolete && !ends) { // behind no octet it ends an empty line, which has no answer
             console_break_line(&console, CONSOLE_ERROR_STOPPED);
         }
         console_receive(&console, (uint8_t)octet);
-        if (octet == '\n' || octet == '\r') {
+        if (ends) {
             return; // a tick may be due
         }
     }

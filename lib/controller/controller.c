@@ -257,7 +257,7 @@ static uint8_t bit_of(uint8_t spring)
     return (uint8_t)(1u << (spring & 7u));
 }
 
-static bool is_mistrusted(const controller_t *controller, uint8_t spring)
+bool controller_is_mistrusted(const controller_t *controller, uint8_t spring)
 {
     return (controller->mistrusted[spring / 8u] & bit_of(spring)) != 0;
 }
@@ -276,7 +276,7 @@ static void begin_circuit(controller_t *controller, const current_control_parame
     controller->peers = (circuit_peers_t){0};
     circuit_source_begin(&controller->source, circuit);
     for (uint8_t k = 0; k < controller->springs; k++) {
-        if (is_mistrusted(controller, k)) {
+        if (controller_is_mistrusted(controller, k)) {
             controller_mistrust(controller, k);
         }
     }
@@ -738,7 +738,7 @@ static bool heats_when_cleared(safety_fault_t fault)
 uint16_t controller_clear_wait_s(const controller_t *controller, uint8_t spring)
 {
     const thermal_model_parameters_t *const p = &controller->model.parameters;
-    if (!is_mistrusted(controller, spring) ||
+    if (!controller_is_mistrusted(controller, spring) ||
         !heats_when_cleared(safety_fault(&controller->safety, spring))) {
         return 0;
     }

@@ -187,9 +187,12 @@ void controller_host_heard(controller_t *controller);
 void controller_clear_faults(controller_t *controller);
 /* How long a clear will leave such a fault, s; 0: it takes it, or there is none. */
 uint16_t controller_clear_wait_s(const controller_t *controller, uint8_t spring);
-/* After a reset, of a spring that had SAFETY_FAULT_SENSOR_MISMATCH before it: it has that again, as
- * if cleared once. What told of it, how its circuit showed before, is not kept. */
+/* After a reset, of a spring that had SAFETY_FAULT_SENSOR_MISMATCH before it, or had it cleared: it
+ * has that again, as if cleared once. What told of it, how its circuit showed before, is not kept.
+ */
 void controller_mistrust(controller_t *controller, uint8_t spring);
+/* It had SAFETY_FAULT_SENSOR_MISMATCH or _STUCK_ON, and that was cleared since power-on. */
+bool controller_is_mistrusted(const controller_t *controller, uint8_t spring);
 void controller_lock(controller_t *controller);
 /* Levels are set to 0: nothing starts by unlocking. */
 void controller_unlock(controller_t *controller);

@@ -237,11 +237,12 @@ bool safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t 
 
     if (sample->expected_ma == 0) {
         s->on_s = 0;
-    } else if (safety->second_ticks == 0 && s->on_s < UINT16_MAX) {
-        s->on_s++;
-        uint16_t most_s = safety->parameters.maximum_on_s;
-        if (most_s != 0 && s->on_s > most_s) {
+    } else if (safety->second_ticks == 0) {
+        const uint16_t most_s = safety->parameters.maximum_on_s;
+        if (most_s != 0 && s->on_s >= most_s) {
             latch(s, SAFETY_FAULT_ON_TIME);
+        } else if (s->on_s < UINT16_MAX) {
+            s->on_s++;
         }
     }
     return reads;

@@ -249,6 +249,14 @@ TEST(one_stop_leaves_the_supply_and_two_take_it)
     mega.expect_error("supply on", 11);
     mega.expect_ok("clear");
     mega.expect_ok("supply on");
+    for (int k = 0; k < 12; ++k) { /* whatever comes behind the two, and at any moment of a tick */
+        mega.run_ms(1.7);
+        try_from_here([&] {
+            mega.board.send("!!\n!");
+            mega.run_ms(150.0);
+            TEST_ASSERT_FALSE(board_is_fed(mega.raw()));
+        });
+    }
 }
 
 /* PORT, DDR and the timer that can drive the pin: the next tick writes them. */

@@ -36,12 +36,12 @@ def event_times(scenario: Path) -> list[float]:
 
 
 def equal(program: str, avr: Path, folder: Path) -> None:
-    scenario = Path(__file__).with_name("ten_minutes.ini")
+    scenario = Path(__file__).with_name("five_minutes.ini")
     run(program, avr, scenario, "native", folder / "native.csv")
     run(program, avr, scenario, "avr", folder / "avr.csv")
     native, avr_rows = rows(folder / "native.csv"), rows(folder / "avr.csv")
     assert list(native[0]) == list(avr_rows[0]), "the logs have different columns"
-    assert len(native) == len(avr_rows) == 601
+    assert len(native) == len(avr_rows) == 301
     edges = {round(time) + step for time in event_times(scenario) for step in (-1, 0, 1)}
     worst = {"current": 0.0, "edge current": 0.0, "temperature": 0.0, "model": 0.0}
     for one, other in zip(native, avr_rows, strict=True):

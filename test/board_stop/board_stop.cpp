@@ -98,6 +98,23 @@ TEST(stops_while_it_writes_the_eeprom_and_while_the_i2c_bus_hangs)
     off_and_stays_off(mega);
 }
 
+/* Each line once, whatever ends it, and an empty one not at all. */
+TEST(each_line_that_a_stop_drops_is_answered_once)
+{
+    rig mega;
+    mega.boot();
+    mega.board.send("$$\n");
+    mega.run_ms(30.0);
+    mega.board.send("\r\n\n on 1\r\non 2\r\n!");
+    mega.run_ms(300.0);
+    const std::string said = mega.board.take_output();
+    unsigned dropped = 0;
+    for (std::size_t at = 0; (at = said.find("error:12 ", at)) != std::string::npos; ++at) {
+        ++dropped;
+    }
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(3, dropped, said.c_str()); /* `$$`, and the two behind it */
+}
+
 /* And a line right behind it, sent in one go, is obeyed: it is none of what the stop drops. */
 TEST(stops_at_any_moment_of_a_tick)
 {

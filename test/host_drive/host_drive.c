@@ -562,16 +562,16 @@ static double hottest_of_everything(uint32_t seed)
     return hottest_c;
 }
 
-/* Of ten draws, each more than an hour long: most below 120 degC, none far above. Thousands,
+/* Of five draws, each more than an hour long: most below 120 degC, none far above. Thousands,
  * shorter and with faults: bench_swarm, test/worlds. */
 TEST(everything_at_once_stays_within_the_limits)
 {
     unsigned hot = 0;
-    for (uint32_t seed = 11; seed < 21; seed++) {
+    for (uint32_t seed = 11; seed < 16; seed++) {
         const double hottest_c = hottest_of_everything(seed);
         here("draw %u: %.1f degC", (unsigned)seed, hottest_c);
         TEST_ASSERT_TRUE(hottest_c < 135.0);
         hot += hottest_c > 120.0;
     }
-    TEST_ASSERT_LESS_OR_EQUAL_UINT(4, hot);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(2, hot);
 }

@@ -348,40 +348,6 @@ TEST(what_follows_too_little_or_too_much_is_found_after_its_windows)
     }
 }
 
-/* As long as nobody knows the drop, a voltage may be off by as much more: 225 and 15 mV of 750.
- * What was found of the supply widens nothing: its tolerance counts once. */
-TEST(what_is_not_known_of_the_drop_is_let_pass)
-{
-    static const struct {
-        float supply_mv, less_mv, more_mv, unsure_mv;
-        uint16_t steps;
-        double share, beyond_mv;
-        int windows;
-    } table[] = {{5000, 0, 200, 200, 0, 0.0, 230.0, 9},
-                 {5000, 0, 200, 200, 0, 0.0, 250.0, 3}, /* the drop is not less than it is */
-                 {5000, 0, 200, 200, 0, 0.0, -430.0, 9},
-                 {5000, 0, 200, 200, 0, 0.0, -450.0, 3},
-                 {5000, 200, 0, 200, 0, 0.0, 430.0, 9},
-                 {5000, 200, 0, 200, 0, 0.0, 450.0, 3},
-                 {5000, 200, 0, 200, 0, 0.0, -250.0, 3},
-                 /* it may take all of what 120 steps bring, and nothing follows */
-                 {5000, 0, 0, 600, 30, 0.0, 0.0, 2},
-                 {5000, 0, 0, 1000, 30, 0.0, 0.0, 9},
-                 {4200, 0, 0, 0, 0, 0.0, -230.0, 9},
-                 {4200, 0, 0, 0, 0, 0.0, -250.0, 3},
-                 {5500, 0, 0, 0, 0, 0.0, 230.0, 9},
-                 {5500, 0, 0, 0, 0, 0.0, 250.0, 3}};
-    for (size_t n = 0; n < ROWS(table); n++) {
-        source.step_mv = table[n].supply_mv / 800.0f;
-        source.less_mv = table[n].less_mv;
-        source.more_mv = table[n].more_mv;
-        source.unsure_mv = table[n].unsure_mv;
-        row(n);
-        TEST_ASSERT_EQUAL_INT(table[n].windows, windows(120, table[n].steps, table[n].share,
-                                                        table[n].beyond_mv, 0.0));
-    }
-}
-
 /* Of 838 mV behind a switch a drop takes its part, and all of them go with the duty: 0.7 of that
  * must be seen, less what is not known of the drop. */
 TEST(what_follows_is_held_against_all_that_goes_with_the_duty)
@@ -399,63 +365,6 @@ TEST(what_follows_is_held_against_all_that_goes_with_the_duty)
         row(n);
         TEST_ASSERT_EQUAL_INT(table[n].windows,
                               windows(120, 30, table[n].share, -table[n].drop_mv, 0.0));
-    }
-}
-
-/* One window is enough to doubt it: 120 steps, how much of the sweep is followed, what is more. */
-TEST(a_window_of_no_circuit_is_not_sound)
-{
-    static const struct {
-        double share, beyond_mv, swing_mv;
-        bool sound;
-    } table[] = {{1.0, 0.0, 0.0, true},
-                 {0.2, 0.0, 0.0, false},
-                 {1.0, 300.0, 0.0, false},
-                 {1.0, 0.0, 46.0, false}};
-    for (size_t n = 0; n < ROWS(table); n++) {
-        memset(&check, 0, sizeof check);
-        TEST_ASSERT_FALSE(
-            judged(120, 30, table[n].share, table[n].beyond_mv, table[n].swing_mv, 30));
-        TEST_ASSERT_EQUAL(table[n].sound, circuit_check_is_sound(&check));
-        TEST_ASSERT_FALSE(judged(120, 30, 1.0, 0.0, 0.0, 30));
-        TEST_ASSERT_TRUE(circuit_check_is_sound(&check));
-    }
-}
-
-/* A sweep of a quarter from end to end deviates by 0.07 of the duty; a ramp is none. */
-TEST(a_window_tells_whether_it_was_at_one_duty)
-{
-    static const struct {
-        uint16_t to;
-        bool steady;
-    } ends[] = {{120, true}, {100, true}, {91, true}, {87, false}, {40, false}};
-    for (size_t n = 0; n < ROWS(ends); n++) {
-        circuit_window_t window;
-        for (uint16_t tick = 0; tick < 30; tick++) {
-            check.last_duty = tick < 15 ? 120 : ends[n].to;
-            circuit_check_take(&check, 180, 0, check.last_duty, true, 1000, 200);
-        }
-        (void)judges(&window);
-        TEST_ASSERT_EQUAL(ends[n].steady, window.steady);
-    }
-}
-
-/* By the declared supply of 5 V, whatever a drop may be that is not known: 30 % and offsets. */
-TEST(a_window_tells_whether_its_duty_brings_what_is_found)
-{
-    static const struct {
-        int16_t voltage_mv;
-        bool balances;
-    } finds[] = {{0, false}, {300, false}, {345, true}, {500, true}, {660, true}, {680, false}};
-    source.unsure_mv = source.less_mv = source.more_mv = 300.0f;
-    for (size_t n = 0; n < ROWS(finds); n++) {
-        circuit_window_t window;
-        for (uint16_t tick = 0; tick < 30; tick++) {
-            check.last_duty = 80;
-            circuit_check_take(&check, 180, 0, 80, true, 0, finds[n].voltage_mv);
-        }
-        (void)judges(&window);
-        TEST_ASSERT_EQUAL(finds[n].balances, window.balances);
     }
 }
 
@@ -539,22 +448,6 @@ TEST(voltage_that_should_move_by_more_than_half_a_step_is_frozen)
             circuit_check_take(&check, 180, 0, given, true, (int16_t)lround(ma), 404);
         }
         found = judges(NULL);
-    }
-}
-
-/* Too few readings tell nothing, and end the row. */
-TEST(eleven_readings_tell_nothing)
-{
-    for (int n = 0; n < 6; n++) {
-        TEST_ASSERT_FALSE(judged(120, 30, -1.0, 300.0, 100.0, 11));
-    }
-    TEST_ASSERT_FALSE(judged(120, 30, -1.0, 0.0, 0.0, 12));
-    TEST_ASSERT_FALSE(judged(120, 30, -1.0, 0.0, 0.0, 11));
-    TEST_ASSERT_FALSE(judged(120, 30, -1.0, 0.0, 0.0, 12));
-    TEST_ASSERT_TRUE(judged(120, 30, -1.0, 0.0, 0.0, 12));
-    setUp();
-    for (int n = 0; n < 6; n++) { /* every third one is quiet */
-        TEST_ASSERT_FALSE(judged(120, 0, 0.0, 0.0, n % 3 == 2 ? 0.0 : 100.0, 30));
     }
 }
 

@@ -52,25 +52,6 @@ TEST(what_all_show_is_the_supply)
     }
 }
 
-/* 4.2 V and 0.04 ohm more for one, and it is known from then on: what it may have otherwise at
- * first is a change later. */
-TEST(wiring_of_its_own_is_none_but_another_one_later_is)
-{
-    TEST_ASSERT_EQUAL_HEX(0, rounds(100, SPRINGS, HEATS_MV, 0.84f * 0.88f, 0.84f));
-    TEST_ASSERT_EQUAL_HEX(0, rounds(2, SPRINGS, HEATS_MV, 0.84f, 0.84f));
-    TEST_ASSERT_EQUAL_HEX(1, rounds(1, SPRINGS, HEATS_MV, 0.84f, 0.84f));
-}
-
-/* Those that are off or clear say nothing of a supply as it is now. */
-TEST(who_is_off_is_no_peer)
-{
-    TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 0.85f, 0.85f)); /* all on a long cable */
-    for (uint8_t k = 1; k < SPRINGS; k++) {
-        is_off(k);
-    }
-    TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, HEATS_MV, 1.0f, 0.0f)); /* alone on it */
-}
-
 /* Found as it is off, and until it is cleared. */
 TEST(what_is_found_stays_found_until_cleared)
 {
@@ -85,37 +66,6 @@ TEST(what_is_found_stays_found_until_cleared)
     TEST_ASSERT_EQUAL_HEX(1, rounds(1, SPRINGS, HEATS_MV, 0.7f, 1.0f));
     circuit_peers_clear(&peers, 0, true);
     TEST_ASSERT_FALSE(circuit_peers_judge(&peers, SPRINGS, 0, &nothing, &source));
-}
-
-/* Found by others: from the first it was of another shunt, and the right one is put in. */
-TEST(a_sensor_that_was_wrong_from_the_first_may_be_another_one_after_a_clear)
-{
-    for (uint8_t driven = 1; driven <= SPRINGS; driven = (uint8_t)(driven + 8u)) {
-        setUp();
-        TEST_ASSERT_EQUAL_HEX(0, rounds(5, driven, HEATS_MV, 0.83f, 1.0f));
-        TEST_ASSERT_EQUAL_HEX(0, rounds(2, driven, HEATS_MV, 1.06f, 1.0f));
-        circuit_peers_clear(&peers, 0, true);
-        TEST_ASSERT_EQUAL_HEX(0, rounds(50, driven, HEATS_MV, 1.06f, 1.0f));
-        TEST_ASSERT_EQUAL_HEX(0, rounds(2, driven, HEATS_MV, 0.8f, 1.0f));
-        circuit_peers_clear(&peers, 0, false); /* another spring's fault */
-        TEST_ASSERT_EQUAL_HEX(1, rounds(3, driven, HEATS_MV, 0.8f, 1.0f));
-    }
-}
-
-/* An open spring shows nothing of what its duty should bring: soldered, cleared, it is driven. */
-TEST(what_is_no_share_of_a_supply_is_not_what_it_showed_before)
-{
-    for (unsigned doubted = 0; doubted < 2; doubted++) {
-        setUp();
-        circuit_window_t open = window_of(0.0f, HEATS_MV, 0.0f);
-        open.balances = false;
-        for (unsigned n = 0; n < 4; n++) {
-            TEST_ASSERT_FALSE(circuit_peers_judge(&peers, SPRINGS, 0, &open, &source));
-        }
-        circuit_peers_clear(&peers, 0, doubted != 0);
-        TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, HEATS_MV, 1.0f, 0.0f));
-        TEST_ASSERT_EQUAL_HEX(1, rounds(3, 1, HEATS_MV, 0.7f, 0.0f)); /* from then on it is */
-    }
 }
 
 /* A supply of 8 V instead of 5, or another shunt, begins within a window: what that shows is of
@@ -143,18 +93,6 @@ TEST(what_only_offsets_explain_is_not_what_it_showed_before)
     TEST_ASSERT_EQUAL_HEX(1, rounds(3, 1, 150.0f, 0.7f, 0.0f));
 }
 
-/* A selftest of 0.3 A with half of a shunt, which is then exchanged: it had no fault, so a clear
- * forgets nothing. */
-TEST(of_too_few_volts_nothing_is_what_it_showed_before)
-{
-    TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, 110.0f, 0.75f, 0.0f));
-    TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, HEATS_MV, 1.0f, 0.0f));
-    TEST_ASSERT_EQUAL_HEX(1, rounds(3, 1, HEATS_MV, 0.75f, 0.0f)); /* from here on it is */
-    setUp();
-    TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, 130.0f, 0.75f, 0.0f));
-    TEST_ASSERT_EQUAL_HEX(1, rounds(3, 1, HEATS_MV, 1.0f, 0.0f));
-}
-
 /* However slow: what is soldered stays what it is; no share is learnt after 127 windows. */
 TEST(a_drift_is_found_however_slow)
 {
@@ -169,57 +107,6 @@ TEST(a_drift_is_found_however_slow)
         }
         TEST_ASSERT_EQUAL_HEX(1, found);
         TEST_ASSERT_FLOAT_WITHIN(0.01f, 0.925f, share);
-    }
-}
-
-/* From 0.25 V on with that drop: below, offsets make more than what a share may be. */
-TEST(of_too_few_volts_no_share_is_learnt)
-{
-    for (unsigned more = 0; more < 2; more++) {
-        setUp();
-        source.drop_mv = 400.0f;
-        TEST_ASSERT_EQUAL_HEX(0, rounds(2, SPRINGS, more != 0 ? 260.0f : 240.0f, 1.0f, 1.0f));
-        TEST_ASSERT_EQUAL_UINT(more, peers.spring[SPRINGS - 1u].learnt != 0);
-    }
-}
-
-/* And of its own: lower than what it shows beside the others, if not than theirs. */
-TEST(what_is_not_known_of_the_drop_is_let_pass_on_the_side_of_its_own_share)
-{
-    for (unsigned is_less = 0; is_less < 2; is_less++) {
-        setUp();
-        TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 1.1f, 1.0f));
-        *(is_less != 0 ? &source.less_mv : &source.more_mv) = 200.0f;
-        source.unsure_mv = 200.0f;
-        for (uint8_t k = 1; k < SPRINGS; k++) {
-            (void)takes(k, HOLDS_MV, 1.0f);
-        }
-        bool found = false;
-        for (unsigned window = 0; window < CIRCUIT_PEERS_WINDOWS; window++) {
-            found = takes(0, HEATS_MV, 0.95f);
-        }
-        TEST_ASSERT_EQUAL(is_less == 0, found);
-    }
-}
-
-/* Found, cleared, and at volts at which the drop may make as much: it is not acquitted by that. */
-TEST(what_is_not_known_of_the_drop_acquits_nobody)
-{
-    for (unsigned driven = 1; driven <= SPRINGS; driven += 8u) {
-        setUp();
-        TEST_ASSERT_EQUAL_HEX(0, rounds(5, (uint8_t)driven, HEATS_MV, 1.0f, 1.0f));
-        TEST_ASSERT_FALSE(takes(0, HEATS_MV, 0.85f));
-        circuit_peers_suspect(&peers, 0, 4096);
-        circuit_peers_clear(&peers, 0, true);
-        source.more_mv = 200.0f;
-        for (unsigned n = 0; n < 3; n++) {
-            TEST_ASSERT_FALSE(takes(0, HOLDS_MV, 0.8f));
-            TEST_ASSERT_EQUAL_UINT(CIRCUIT_PEERS_WINDOWS - 1u, peers.spring[0].odd);
-            peers.spring[0].shown_16mv = 71; /* 1140 mV */
-        }
-        TEST_ASSERT_TRUE(takes(0, HEATS_MV, 0.85f));
-        TEST_ASSERT_FALSE(takes(0, HEATS_MV, 1.0f)); /* but this does */
-        TEST_ASSERT_EQUAL_UINT(0, peers.spring[0].odd);
     }
 }
 
@@ -247,26 +134,6 @@ TEST(what_one_that_was_found_showed_before_is_told_by_another_belief)
             const float mv = duty * now.step_mv - now.drop_mv;
             TEST_ASSERT_EQUAL(lies, takes(0, mv, table[n][2 + lies]));
         }
-    }
-}
-
-/* Heated, and then held where all that its duty brings may be the drop: 35 mV of 150. */
-TEST(one_alone_is_not_judged_where_the_drop_may_take_all)
-{
-    for (unsigned tells = 0; tells < 2; tells++) {
-        setUp();
-        TEST_ASSERT_EQUAL_HEX(0, rounds(3, 1, HEATS_MV, 1.0f, 0.0f));
-        source.unsure_mv = tells != 0 ? 149.0f : 151.0f;
-        bool found = false;
-        for (unsigned n = 0; n < CIRCUIT_PEERS_WINDOWS; n++) {
-            found = takes(0, 150.0f, 0.23f);
-        }
-        TEST_ASSERT_EQUAL(tells, found);
-        found = false;
-        for (unsigned n = 0; n < CIRCUIT_PEERS_WINDOWS; n++) {
-            found = takes(0, HEATS_MV, 0.7f); /* it is known still what it showed */
-        }
-        TEST_ASSERT_TRUE(found);
     }
 }
 
@@ -428,24 +295,6 @@ TEST(another_belief_begins_anew_and_keeps_what_is_each_ones_own)
     circuit_peers_renew(&peers, SPRINGS - 1u, &source, &source); /* so many, and no more */
     TEST_ASSERT_EQUAL_UINT(0, peers.spring[SPRINGS - 2u].share_q7);
     TEST_ASSERT_EQUAL_UINT(128, peers.spring[SPRINGS - 1u].share_q7);
-}
-
-/* Two on longer cables, two on shorter ones: beside whichever it is driven. */
-TEST(a_set_that_changes_moves_nothing)
-{
-    static const float shares[SPRINGS] = {1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.1f, 1.1f, 0.9f, 0.9f};
-    static const unsigned sets[] = {0x1FF, 0x183, 0x063, 0x1FF};
-    for (unsigned set = 0; set < 4; set++) {
-        for (unsigned n = 0; n < 30; n++) {
-            for (uint8_t k = 0; k < SPRINGS; k++) {
-                if ((sets[set] >> k & 1u) != 0) {
-                    TEST_ASSERT_FALSE(takes(k, HEATS_MV, shares[k]));
-                } else {
-                    is_off(k);
-                }
-            }
-        }
-    }
 }
 
 /* At each limit: a share that passes and one that is found in the third window. So many are driven;
@@ -643,18 +492,6 @@ TEST(a_window_that_would_not_tell_a_lie_acquits_nobody_who_was_found)
     TEST_ASSERT_TRUE(takes(0, HEATS_MV, 0.9f));
 }
 
-/* One that shows again what it showed is acquitted: it takes three windows to be found anew. */
-TEST(who_shows_its_own_share_again_is_acquitted)
-{
-    TEST_ASSERT_EQUAL_HEX(0, rounds(20, SPRINGS, 600.0f, 1.0f, 1.0f));
-    TEST_ASSERT_EQUAL_HEX(1, rounds(3, SPRINGS, 600.0f, 0.8f, 1.0f));
-    circuit_peers_clear(&peers, 0, true);
-    TEST_ASSERT_EQUAL_HEX(0, rounds(1, SPRINGS, HOLDS_MV, 0.96f, 1.0f));
-    TEST_ASSERT_EQUAL_UINT8(20, peers.spring[0].learnt); /* 19 before */
-    TEST_ASSERT_EQUAL_HEX(0, rounds(2, SPRINGS, 600.0f, 0.8f, 1.0f));
-    TEST_ASSERT_EQUAL_HEX(1, rounds(1, SPRINGS, 600.0f, 0.8f, 1.0f));
-}
-
 /* 0 is for who says nothing; more than 255 / 128 is as much. */
 TEST(a_share_is_kept_to_the_nearest_128th)
 {
@@ -733,21 +570,6 @@ TEST(offsets_make_nothing_of_a_share_at_the_same_volts)
     TEST_ASSERT_EQUAL_HEX(1, rounds(3, 1, HOLDS_MV, 0.87f, 0.0f));
 }
 
-/* Of two that do not agree: whichever shows less. */
-TEST(the_one_at_most_volts_tells_a_supply_that_moves)
-{
-    for (unsigned n = 0; n < 4; n++) {
-        setUp();
-        TEST_ASSERT_EQUAL_HEX(0, rounds(8, 3, HEATS_MV, 1.0f, 1.0f));
-        const uint8_t at_most = n % 2u != 0 ? 1 : 2, at_few = at_most == 1 ? 2 : 1;
-        for (unsigned window = 0; window < 6; window++) {
-            TEST_ASSERT_FALSE(takes(at_most, HEATS_MV, 0.85f));
-            TEST_ASSERT_FALSE(takes(at_few, 110.0f, n < 2 ? 0.75f : 1.0f));
-            TEST_ASSERT_FALSE(takes(0, HEATS_MV, 0.85f));
-        }
-    }
-}
-
 /* Half of the difference to each of two; beside those that outvote it, all of it. */
 TEST(what_two_learn_of_each_other_stays)
 {
@@ -760,16 +582,6 @@ TEST(what_two_learn_of_each_other_stays)
         TEST_ASSERT_FALSE(takes(k, HEATS_MV, k == 3 ? 0.9f : 1.0f));
     }
     TEST_ASSERT_INT_WITHIN(8, 3686, peers.spring[3].own_q12);
-}
-
-/* Of 110 mV offsets make a quarter: it agrees with whatever this one shows. */
-TEST(another_one_at_few_volts_acquits_nobody)
-{
-    TEST_ASSERT_EQUAL_HEX(0, rounds(8, 2, HEATS_MV, 1.0f, 1.0f));
-    for (unsigned window = 0; window < CIRCUIT_PEERS_WINDOWS; window++) {
-        TEST_ASSERT_FALSE(takes(1, 110.0f, 1.0f));
-        TEST_ASSERT_EQUAL(window == CIRCUIT_PEERS_WINDOWS - 1u, takes(0, HEATS_MV, 0.85f));
-    }
 }
 
 /* A lie of a hold has its spring heated in the next window: the others' few volts, and all that

@@ -163,20 +163,6 @@ TEST(a_supply_that_moves_for_all_is_no_lie_of_one)
     }
 }
 
-/* Of another kind than the shares before: those are nothing to compare with. */
-TEST(who_is_outvoted_at_last_begins_anew)
-{
-    for (unsigned first = 0; first < 2; first++) {
-        setUp();
-        for (unsigned n = 0; n < 10; n++) {
-            const bool outvoted = (n >= 5) == (first != 0);
-            shown_t s = honest;
-            s.spring_ohm *= n >= 5 ? 0.8f : 1.0f;
-            TEST_ASSERT_FALSE(takes_beside(s, 0.7f, outvoted, false));
-        }
-    }
-}
-
 /* One is as much of the others by whatever supply is believed. */
 TEST(another_supply_moves_nothing_beside_others)
 {
@@ -189,16 +175,6 @@ TEST(another_supply_moves_nothing_beside_others)
         TEST_ASSERT_UINT_WITHIN(1, outvoted != 0 ? share_q12 : 1.2f * share_q12,
                                 step.was[0].share_q12);
     }
-}
-
-/* Of little voltage a step of its register is much. */
-TEST(a_small_voltage_tells_less)
-{
-    const shown_t before = with(0.27f, CURRENT_GAIN, 1.0f);
-    TEST_ASSERT_EQUAL(0, found_after(before, with(0.27f, CURRENT_GAIN, 0.85f), 1.0f));
-    TEST_ASSERT_TRUE(found_after(before, with(0.27f, CURRENT_GAIN, 0.7f), 1.0f) != 0);
-    const shown_t less = with(0.24f, CURRENT_GAIN, 1.0f); /* below 0.1 V none is told */
-    TEST_ASSERT_EQUAL(0, found_after(less, with(0.24f, CURRENT_GAIN, 2.0f), 1.0f));
 }
 
 /* A row ends what is compared; another current begins it anew. */
@@ -224,17 +200,6 @@ TEST(windows_must_follow_on_each_other)
             TEST_ASSERT_EQUAL(other == 0, takes(now));
         }
     }
-}
-
-TEST(what_it_showed_before_is_known)
-{
-    TEST_ASSERT_EQUAL_UINT(0, circuit_step_before_q12(&step));
-    TEST_ASSERT_FALSE(takes(honest));
-    TEST_ASSERT_EQUAL_UINT(4096, circuit_step_before_q12(&step));
-    TEST_ASSERT_FALSE(takes(with(0.9f, CURRENT_GAIN, 0.93f)));
-    TEST_ASSERT_FALSE(takes(with(0.9f, CURRENT_GAIN, 0.8f)));
-    TEST_ASSERT_TRUE(takes(with(0.9f, CURRENT_GAIN, 0.8f)));
-    TEST_ASSERT_EQUAL_UINT(4096, circuit_step_before_q12(&step));
 }
 
 /* A share of what it is to come to, in so many windows; the gain or offset at which it is found, or
@@ -398,25 +363,6 @@ TEST(a_twentieth_of_the_supply_makes_no_lie_of_what_changed_meanwhile)
     }
 }
 
-/* A spring transforms, its contact creeps, supply and wiring move: each at its own pace. */
-TEST(what_grows_and_is_no_lie_passes)
-{
-    static const unsigned lasts[] = {10, 40, 100, 500, 5000};
-    for (unsigned k = 0; k < ROWS(lasts); k++) {
-        for (unsigned wired = 0; wired < 3; wired++) {
-            const float ways[][2] = {{SPRING, 0.29f}, {SPRING, 0.17f}, {SPRING, 0.5f},
-                                     {SUPPLY, 0.8f},  {SUPPLY, 1.2f},  {WIRING, 0.3f}};
-            for (unsigned n = 0; n < ROWS(ways); n++) {
-                shown_t from = honest;
-                from.wiring_ohm = 0.14f + 0.04f * (float)wired;
-                const unsigned field = (unsigned)ways[n][0];
-                TEST_ASSERT_EQUAL_FLOAT(ways[n][1],
-                                        found_on_its_way(from, field, ways[n][1], lasts[k]));
-            }
-        }
-    }
-}
-
 /* One end of a cable moves by a twentieth, and back. */
 TEST(a_spring_that_transforms_as_others_switch_passes)
 {
@@ -490,16 +436,6 @@ TEST(another_belief_of_the_supply_makes_another_share)
             TEST_ASSERT_EQUAL_UINT(1, steps[k].odd);
         }
         TEST_ASSERT_EQUAL_MEMORY(&was, &steps[2], sizeof was); /* no spring of this array */
-    }
-}
-
-/* As it lies now it was never seen at this current: what was before another one is long ago. */
-TEST(another_current_ends_what_was_known)
-{
-    TEST_ASSERT_FALSE(takes(honest));
-    TEST_ASSERT_FALSE(takes(with(2.5f, CURRENT_GAIN, 1.0f)));
-    for (unsigned n = 0; n < 5; n++) {
-        TEST_ASSERT_FALSE(takes(with(0.9f, CURRENT_GAIN, 0.8f)));
     }
 }
 

@@ -640,6 +640,22 @@ TEST(nothing_is_said_without_room_and_a_stop_drops_what_had_begun)
     expect_said("error:12 ");
 }
 
+/* What begins to tell is silent until it does: a stop in between leaves what told before. */
+TEST(a_stop_leaves_the_telemetry_that_was_on)
+{
+    static const char *const begins[] = {"telemetry teleplot 10\n", "telemetry off\n",
+                                         "telemetry inputs\n"};
+    for (size_t n = 0; n < sizeof begins / sizeof begins[0]; n++) {
+        row(n);
+        expect_ok("telemetry csv 7");
+        receive(begins[n]);
+        console_stop(&console);
+        TEST_ASSERT_EQUAL_UINT8(TELEMETRY_CSV, telemetry.format);
+        TEST_ASSERT_EQUAL_UINT8(7, telemetry.hz);
+        TEST_ASSERT_EQUAL_UINT8(TELEMETRY_CSV, settings.board.telemetry_format);
+    }
+}
+
 TEST(status_is_one_line_and_says_what_the_thermistor_cannot_mean)
 {
     expect_ok("model cold");

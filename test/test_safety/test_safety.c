@@ -282,10 +282,13 @@ TEST(lock_holds_until_unlocked_and_is_no_fault)
 
 TEST(on_time_is_limited_only_where_it_is_set)
 {
-    ticks(4, &running, 50u * 3600u);
+    ticks(4, &running, 50u * 65537u);
     TEST_ASSERT_TRUE(safety_allows(&safety, 4));
+    parameters.maximum_on_s = 10; /* and from then on counts what was before */
+    TEST_ASSERT_TRUE(safety_apply(&safety, &parameters, NULL));
+    ticks(4, &running, 50);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_ON_TIME, safety_fault(&safety, 4));
 
-    parameters.maximum_on_s = 10;
     TEST_ASSERT_TRUE(safety_init(&safety, &parameters, 9, NULL));
     for (int pulse = 0; pulse < 5; pulse++) { /* pauses start it again */
         ticks(4, &running, 499);
@@ -299,6 +302,13 @@ TEST(on_time_is_limited_only_where_it_is_set)
     ticks(4, &running, 1);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_ON_TIME, safety_fault(&safety, 4));
     TEST_ASSERT_TRUE(safety_allows(&safety, 5));
+
+    parameters.maximum_on_s = UINT16_MAX; /* the most that may be set is a limit, too */
+    TEST_ASSERT_TRUE(safety_init(&safety, &parameters, 9, NULL));
+    ticks(4, &running, 50u * UINT16_MAX);
+    TEST_ASSERT_TRUE(safety_allows(&safety, 4));
+    ticks(4, &running, 1);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_ON_TIME, safety_fault(&safety, 4));
 }
 
 /* The quick look lets nothing pass that is beyond a limit, whatever the limits are. */
