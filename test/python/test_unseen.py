@@ -14,6 +14,7 @@ from ninespring.find.diagnosis import first_fit
 from ninespring.find.evidence import likelihood
 from ninespring.find.lasting import likeliest
 from ninespring.find.residual import depends_on
+from ninespring.find.search import Search
 from ninespring.find.unseen import LAG, OF_THAT_DAY, Unseen, _hardly_shown, errors, pinned, splits
 from ninespring.infer import budget
 from ninespring.infer.declared import base_spec
@@ -561,6 +562,42 @@ def test_the_number_of_a_run_that_is_left_out_is_none_of_those_that_stay() -> No
     assert _hardly_shown(of_all, of_part, [0, 2]) == ["ambient_c@2"]  # type: ignore[arg-type]
 
 
+def in_turn(which: tuple[int, ...], rows: int, seed: int) -> Run:
+    """Return a run of two heaters of which some are driven, for a third of it and for a quarter at half; the room is logged."""
+    drive, shown, warm = np.zeros((rows, 2)), np.empty((rows, 2)), np.full(2, 21.0)
+    for k in which:
+        drive[60 : 60 + rows // 3, k], drive[60 + rows // 2 : 60 + 3 * rows // 4, k] = 1.0, 0.5
+    for n in range(rows):
+        shown[n] = warm
+        warm = warm + (0.5 * drive[n] - 0.0085 * (warm - 21.0) + 0.0022 * (warm[::-1] - warm)) / 2.0
+    shown += np.random.default_rng(seed).normal(0.0, 0.3, shown.shape)
+    return Run("heater", "", np.arange(float(rows)), "command", drive, shown, np.zeros(rows), np.full(rows, 21.0))
+
+
+def test_beside_what_stays_as_all_had_it_the_rest_is_fitted_again() -> None:
+    """Each heater by itself for long, both for three minutes: of what is left out those tell power and loss together, neither alone. A power
+    that stays beside a loss that was found with another one foretold runs to a kelvin."""
+    off = []
+    for seed in range(3):
+        runs = [in_turn((0,), 1200, seed), in_turn((1,), 1200, 10 + seed), in_turn((0, 1), 180, 20 + seed)]
+        problem = Problem(Array(1, 2), runs, HEATERS)
+        known = library.candidates(scene_of(problem))
+        base = first_fit(problem, base_spec(problem))
+        spec = next(one for one in known if one.variant == "spring 2").added_to(base.spec)
+        fit = problem.fit(spec, base.as_dict(), errors=True)
+        off += [rms([errors(split, fit, None)[1]]) for split in splits(problem)[:2]]
+    assert rms([np.array(off)]) < 0.36, "its noise is 0.3"
+
+
+def test_the_baseline_with_a_lag_is_fitted_to_all_runs_too() -> None:
+    """What a part of the runs hardly shows stays as it was beside a lag, not as it was without."""
+    problem = Problem(Array(1, 2), [heaters(22.0, 1, bent=0.0), heaters(20.0, 2, bent=0.0)], HEATERS)
+    base = first_fit(problem, base_spec(problem))
+    lagged = Unseen(problem, Search(problem, library.candidates(scene_of(problem)), base), base).lagged
+    assert lagged.value("sensor_lag_s") == pytest.approx(25.0, rel=0.1)
+    assert rms(lagged.residual) < 0.5 * rms(base.residual)
+
+
 def heaters(
     room_c: float, seed: int, warm_k: float = 0.0, later_k: float = 0.0, late_s: float = 25.0, bent: float = 0.02
 ) -> Run:
@@ -633,7 +670,7 @@ def crossed(room_c: float, seed: int) -> Run:
     return Run("heater", "0" * 64, np.arange(420.0), "command", drive, shown, np.zeros(420), np.full(420, room_c))
 
 
-def test_what_least_squares_found_is_the_model_and_no_name_where_it_predicts_better(
+def test_what_least_squares_found_is_the_model_and_no_certain_name_where_it_predicts_better(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(budget, "ENOUGH", 3000)  # a search of seconds
@@ -641,9 +678,10 @@ def test_what_least_squares_found_is_the_model_and_no_name_where_it_predicts_bet
     found = diagnosis.diagnose(Array(1, 2), [crossed(22.0, 1), crossed(20.0, 2)], model=given)
     told, made = found.told, found.model.effects
     assert isinstance(told.unseen, results.Unseen) and told.unexplained
-    assert made and not set(made) & set(found.effects), "it is given, and nothing of it named"
+    assert len(set(made) - set(found.effects)) > 1, "it is given, whatever of it is named"
+    assert all(one.certainty == "probable" for one in told.effects)
     assert f"The model is the declared model with {' and '.join(made)}, each named or not" in told.unseen.text
-    assert not any(one.on_chip for one in told.effects), "what is named is not in the model"
+    assert not any(one.on_chip for one in told.effects)
     assert told.unseen.rmse_c < 0.8 * min(told.unseen.declared_rmse_c, told.unseen.with_lag_rmse_c)
     for run in (crossed(21.0, seed) for seed in (7, 8, 9)):
         each = found.model, model_of(found.problem, found.final, found.problem.runs)

@@ -148,9 +148,13 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, n
         problem.take_for(colour)
     beside = not split.alone and not {RUN_AMBIENT, RUN_SENSOR}.isdisjoint(spec.effects)
     fitted = problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS, errors=beside)
-    # what only the left-out run shows, these do not tell: it stays
-    known = {key: start[key] for key in (*fitted.stuck, *_hardly_shown(fit, fitted, kept)) if key in start}
-    fitted.values = np.array([known.get(f.key, value) for f, value in zip(spec.free, fitted.values, strict=True)])
+    # what only the left-out run shows, these do not tell: it stays, and what is known beside it alone goes with it
+    if known := {key: start[key] for key in (*fitted.stuck, *_hardly_shown(fit, fitted, kept)) if key in start}:
+        held = tuple(replace(f, start=known[f.key], prior=PINNED) if f.key in known else f for f in spec.free)
+        beside_them = replace(spec, free=held)
+        fitted = problem.fit(
+            beside_them, fitted.as_dict() | known, tolerance=1e-3, max_steps=STEPS, errors=beside, near=fitted
+        )
     run, values = split.left_out, fitted.as_dict()
     if (share := room.around_share(values)) is not None:
         run = replace(run, around_share=share)
@@ -199,7 +203,10 @@ class Unseen:
         if self.lag is not None and LAG not in self.base.spec.effects:
             spec = self.lag.added_to(self.base.spec)
             start = self.base.as_dict() | self.lag.start_at(1.0)
-            self.lagged = replace(self.base, spec=spec, values=np.array([start[f.key] for f in spec.free]))
+            colour = self.problem.colour
+            self.problem.take_for(None)
+            self.lagged = self.problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS)
+            self.problem.take_for(colour)
 
     def errors(self, fit: Fit, colour: Colour | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Return the errors, degC, of runs left out, the others fitted by how errors last, and those without what their rooms

@@ -26,6 +26,8 @@ HIDES_S = 20.0
 WARM_K = 3.0
 """A spring that begins so much above its room was driven before: air, plate and holders are warm, too, as if it had been so warm for long,
 or by a share of that which the run tells."""
+LEAST_HELD = 1e-3
+"""J/K that air, a plate or a holder hold at least."""
 HOTTEST_C = 300.0
 """Above which nothing transforms any more, and no spring is held."""
 
@@ -75,8 +77,28 @@ def _from_austenite(plant: native.Plant, run: Run, begin: int, was_c: float | np
 def _in_balance(plant: native.Plant, mode: int, drive: np.ndarray) -> None:
     for k in np.flatnonzero(np.isfinite(drive)):
         plant.drive(int(k), mode, float(drive[k]))
+    # where all comes to rest does not depend on what is held there, and what holds much takes days
+    quick = _as_quick_as_a_spring(plant, len(drive))
+    held = {name: plant.get(name) for name in quick}
+    plant.set_all({name: min(held[name], max(LEAST_HELD, one)) for name, one in quick.items()})
     # a drifting ambient has no balance: it begins at the run's first row
     plant.settle_without("ambient_drift", 1e6)
+    plant.set_all(held)
+
+
+def _as_quick_as_a_spring(plant: native.Plant, springs: int) -> dict[str, float]:
+    """Return what air, plate and holders would hold, J/K, that answer in a spring's own time; of those that there are."""
+    get, pace = plant.get, fades_per_s(plant)
+    out = {}
+    if plant.has("shared_air"):
+        out["air_heat_capacity_j_per_k"] = (get("air_exchange_w_per_k") + springs * get("loss_w_per_k")) / pace
+    if plant.has("plate_conduction"):
+        out["plate_heat_capacity_j_per_k"] = (
+            get("plate_loss_w_per_k") + springs * get("plate_coupling_w_per_k")
+        ) / pace
+    if plant.has("holder_mass"):
+        out["holder_heat_capacity_j_per_k"] = get("holder_coupling_w_per_k") / pace
+    return out
 
 
 def hidden_k(run: Run, ambient_c: float, fades_per_s: float) -> np.ndarray:
