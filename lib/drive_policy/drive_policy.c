@@ -195,6 +195,15 @@ static bool waits_for_supply(const drive_policy_spring_t *s)
     return s->granted_ma < s->wanted_ma - (s->wanted_ma >> 2);
 }
 
+/* Its own limit leaves too little of what it asked for to go on, and it is hot enough to have
+ * transformed. */
+static bool is_limited(const drive_policy_spring_t *s, const drive_policy_input_t *in, uint8_t k)
+{
+    return s->ceiling_ma < s->wanted_ma - (s->wanted_ma >> 2) &&
+           thermal_model_temperature_c7(in->model, k) >
+               thermal_model_transformation(in->model, k).austenite_finish_c7;
+}
+
 /* Its own limit leaves it where it is: it would wait there for ever. */
 static bool is_stalled(const drive_policy_spring_t *s)
 {
@@ -210,6 +219,7 @@ static void heat(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
     const spring_belief_t *b = belief_of(in, k);
     const thermal_model_transformation_t points = thermal_model_transformation(in->model, k);
     const int16_t c7 = thermal_model_temperature_c7(in->model, k);
+    const bool limited = is_limited(s, in, k);
     s->wanted_ma = boost_of(policy, in, k);
     if (spring_estimator_possible(b) == SPRING_PHASE_ANY) {
         return;
@@ -217,8 +227,8 @@ static void heat(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
     const bool full = is_full(level_permille);
     const float level = 0.001f * (float)level_permille;
     const bool waits = waits_for_supply(s);
-    const bool ends =
-        is_stalled(s) || (full && spring_estimator_has_transformed(in->belief, in->model, k));
+    const bool ends = limited || is_stalled(s) ||
+                      (full && spring_estimator_has_transformed(in->belief, in->model, k));
     const bool asks = !full || s->partly || waits; /* as a rule not, and once */
     const float phase = !ends && asks ? phase_of(in, k) : 0.0f;
     if (ends || (!full && phase >= level)) {

@@ -240,24 +240,29 @@ TEST(spring_on_trial_is_given_less_and_less)
 
 /* ---- a heating ---- */
 
-/* It ends with the phase that was asked for; a limit that lets it rise ends nothing. */
-TEST(heating_ends_at_its_phase)
+/* It ends with the phase that was asked for, or where a limit leaves less than three quarters of
+ * what it wanted and it is hot enough; or may be, and rises no more. */
+TEST(heating_ends_at_its_phase_or_where_a_limit_ends_it)
 {
     static const struct {
         float c;
         uint8_t possible;
         float phase;
-        uint16_t permille, ceiling_ma;
+        uint16_t permille, wanted_ma, ceiling_ma;
         drive_policy_stage_t stage;
-    } table[] = {{70.0f, M, 0.0f, 1000, 3000, HEAT},   {92.0f, A, 1.0f, 1000, 3000, HOLD},
-                 {92.0f, B, 0.499f, 500, 3000, HEAT},  {92.0f, B, 0.501f, 500, 3000, HOLD},
-                 {92.0f, B, 0.501f, 1000, 3000, HEAT}, {98.1f, B, 0.5f, 900, 2250, HEAT},
-                 {98.1f, B, 0.5f, 900, 600, HEAT}};
+    } table[] = {
+        {70.0f, M, 0.0f, 1000, 3000, 3000, HEAT},   {92.0f, A, 1.0f, 1000, 3000, 3000, HOLD},
+        {92.0f, B, 0.499f, 500, 3000, 3000, HEAT},  {92.0f, B, 0.501f, 500, 3000, 3000, HOLD},
+        {92.0f, B, 0.501f, 1000, 3000, 3000, HEAT}, {98.1f, B, 0.5f, 900, 3000, 2250, HEAT},
+        {98.1f, B, 0.5f, 900, 3000, 2249, HOLD},    {98.1f, B, 0.5f, 900, 2000, 1500, HEAT},
+        {98.1f, B, 0.5f, 900, 2000, 1499, HOLD},    {98.0f, B, 0.5f, 900, 3000, 0, HEAT},
+    };
     for (size_t n = 0; n < ROWS(table); n++) {
         begin(1, 2);
         believed(0, table[n].c, table[n].possible, table[n].phase);
         stands(0, HEAT, table[n].permille);
         policy.spring[0].ceiling_ma = table[n].ceiling_ma;
+        policy.spring[0].wanted_ma = table[n].wanted_ma;
         turn_of(0);
         row(n);
         TEST_ASSERT_EQUAL(table[n].stage, drive_policy_stage(&policy, 0));
