@@ -18,6 +18,11 @@
 #define TRUST_STILL_SDS 0.7f /* where the transformation may never show: probably over */
 #define TRUST_ONSET_SDS 1.3f /* where its beginning was seen: certainly, but for 10 % */
 
+#define READS_MISSING 0.02f /* of the phase: nobody feels it */
+#define READS_TURNS   8     /* at least, of a step's mean */
+#define READS_NOISE   0.354f
+#define TWO_NOISE     0.707f
+
 #define EXPLAINED_LEAST 0.005f /* of a resistance: what a sensor's steps leave in one turn */
 
 #define LOOK_MOST    0.4f
@@ -561,9 +566,9 @@ static bool surely_finished(const spring_belief_t *b, const thermal_model_t *mod
            spring_c(thermal_model_transformation(model, k).austenite_finish_c7);
 }
 
-/* It is over, once heat changes it no more, by what it reads in two turns above austenite start:
- * what its austenite read when it had transformed last, and no more than a temperature makes of
- * that. */
+/* It is over, once heat changes it no more, by what it reads above austenite start, in two turns or
+ * all of a step: as its austenite did when it had transformed last, but for what is not worth to
+ * heat on for, and no more than a temperature makes of that. */
 static bool reads_austenite(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
@@ -573,10 +578,14 @@ static bool reads_austenite(const spring_belief_t *b, const thermal_model_t *mod
         b->changes || b->ohm_before[1] == 0.0f || now_c7 < t.austenite_start_c7) {
         return false;
     }
-    const float ohm = 0.5f * (b->ohm_before[0] + b->ohm_before[1]);
-    const float beyond = spring_beyond_austenite(b, model, k, ohm);
-    return fabsf(beyond) < spring_read_tolerance(b) &&
-           (l->change > 0.0f ? ohm > austenite_ohm(b, ohm) : beyond < 0.0f);
+    const bool step = b->heating && b->run.heat.turns >= READS_TURNS;
+    const float ohm = step ? b->run.heat.sum_ohm / (float)b->run.heat.turns
+                           : 0.5f * (b->ohm_before[0] + b->ohm_before[1]);
+    const float noise = (step ? READS_NOISE : TWO_NOISE) * b->noise;
+    const float full_ohm = austenite_ohm(b, ohm);
+    const float missing_ohm = l->change > 0.0f ? full_ohm - ohm : ohm - full_ohm;
+    return missing_ohm < (READS_MISSING * fabsf(l->change) - noise) * full_ohm &&
+           fabsf(spring_beyond_austenite(b, model, k, ohm)) < spring_read_tolerance(b);
 }
 
 bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal_model_t *model,

@@ -60,8 +60,9 @@ typedef struct {
     float begun_c;  /* where it began, at the coldest */
     float heat_k;   /* taken up, over heat capacity; less while it waits for its turn */
     float peak_k;   /* the most of it */
-    float mark_k;   /* where the resistance was last compared, and what it was */
-    float mark_ohm; /* 0: nowhere yet */
+    float mark_k;   /* where the resistance was last compared, */
+    float mark_ohm; /* and its mean until there; 0: nowhere yet */
+    float sum_ohm;  /* of the turns since */
     float onset_ohm;
     float onset_k;  /* heat taken up until then; until it is seen, until its change began */
     float cold_ohm; /* at its beginning, martensite; 0: it was not */
@@ -69,6 +70,7 @@ typedef struct {
     float excess;  /* change that no temperature coefficient explains; signed */
     float flat_k;  /* heat since, without such a change */
     float was_ohm; /* its austenite's as it began; 0: not known */
+    uint8_t turns; /* in sum_ohm */
 } spring_heat_t;
 
 /* Of the running hold. */

@@ -113,16 +113,18 @@ static void see_finish(spring_estimator_t *e, spring_belief_t *b, thermal_model_
 /* Heat by which even the coldest and heaviest spring has come so far. */
 static float most_heat_k(const spring_estimator_t *e, const spring_belief_t *b, int16_t limit_c7)
 {
-    /* what does not show takes no latent heat */
-    const float latent_k = b->onset ? e->latent_k : 0.0f;
+    /* what does not show takes no latent heat; what lacks phase does */
+    const bool shows = b->onset || b->possible != SPRING_PHASE_MARTENSITE;
+    const float latent_k = shows ? e->latent_k : 0.0f;
     /* where some austenite is left for certain, its transformation is where it was */
     const float shift_k = (b->possible & SPRING_PHASE_AUSTENITE) != 0 ? 0.0f : SHIFT_BOUND_K;
     return (spring_c(limit_c7) + shift_k - b->run.heat.begun_c + latent_k) * CAPACITY_BOUND;
 }
 
 /* A spring that still transforms, or is known to show it and has not yet, is not hotter than that
- * lets it be, whatever the model says, until it must have come so far. Where it pauses, heat warms
- * it. */
+ * lets it be, whatever the model says, until it must have come so far. While it changes its heat
+ * transforms it. Where it rests, and its level alone says that phase is missing, it loses more than
+ * is believed; or the level is a contact's, and it may be as hot as it was. */
 static void hold_back(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k)
 {
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
@@ -136,13 +138,16 @@ static void hold_back(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
     /* after a look, or at a level, its temperature is a guess; once its transformation was seen, it
      * is known, but for what the surroundings have done since */
     const bool guess = !b->from_full || b->shift_variance_k2 >= SHIFT_SD_K * SHIFT_SD_K;
-    const bool waits = martensite || ((b->onset ? b->run.heat.flat_k < FLAT_K : guess) &&
+    const bool transforms = b->from_full && b->onset;
+    const bool waits = martensite || ((transforms ? b->run.heat.flat_k < FLAT_K : guess) &&
                                       spring_estimator_lacks_phase(b, model, k));
     const bool shows = b->steep || (b->learnt.austenite_ohm > 0.0f && !b->blind && waits);
     if (shows && b->run.heat.heat_k < most_heat_k(e, b, limit_c7)) {
         const spring_before_t before = spring_before(b, model, k);
-        if (!martensite && !b->steep) { /* only its level says so: it may be as hot as it was */
-            b->gone_k += spring_now_c(model, k) - spring_c(limit_c7);
+        if (!martensite && !b->changes) {
+            const float over_k = spring_now_c(model, k) - spring_c(limit_c7);
+            b->gone_k += over_k;
+            spring_correct_loss(e, b, -b->covariance / spring_distance_k2(b) * over_k);
         }
         spring_set_temperature(model, k, spring_c(limit_c7), SPRING_PHASE_MARTENSITE);
         spring_note_on(e, model, k, SPRING_SIGHT_TRANSFORMS, &before, spring_c(limit_c7), 0.0f);
@@ -227,6 +232,14 @@ static void take_phase(const spring_estimator_t *e, spring_belief_t *b, thermal_
     b->seen = true; /* it is acted on in the next turn */
 }
 
+static void begin_step(spring_belief_t *b, float mark_ohm)
+{
+    b->run.heat.mark_ohm = mark_ohm;
+    b->run.heat.mark_k = b->run.heat.heat_k;
+    b->run.heat.sum_ohm = 0.0f;
+    b->run.heat.turns = 0;
+}
+
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is
  * a transformation, whatever its sign. */
 void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
@@ -256,15 +269,21 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
     b->run.heat.peak_k = b->run.heat.heat_k;
     if (b->run.heat.mark_ohm == 0.0f) {
         take_phase(e, b, model, k);
-        b->run.heat.mark_ohm = b->ohm;
-        b->run.heat.mark_k = b->run.heat.heat_k;
+        begin_step(b, b->ohm);
         return;
     }
+    b->run.heat.turns++;
+    b->run.heat.sum_ohm += b->ohm;
     const float step_k = b->run.heat.heat_k - b->run.heat.mark_k;
-    if (step_k < fmaxf(STEP_LEAST_K, STEP_PER_NOISE * b->noise)) {
+    const float turns = (float)b->run.heat.turns;
+    /* the more turns it lasts, the less is noise in their mean */
+    const float least_k = STEP_PER_NOISE * b->noise;
+    if ((step_k < STEP_LEAST_K || step_k * step_k * turns < least_k * least_k) &&
+        b->run.heat.turns < UINT8_MAX) {
         return;
     }
-    const float change = b->ohm / b->run.heat.mark_ohm - 1.0f;
+    const float ohm = b->run.heat.sum_ohm / turns;
+    const float change = ohm / b->run.heat.mark_ohm - 1.0f;
     const float excess = unexplained(change, step_k);
     /* a spring whose change is known changes that way */
     const bool against = b->learnt.austenite_ohm > 0.0f && excess * b->learnt.change < 0.0f;
@@ -274,7 +293,8 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         b->run.heat.onset_k = b->run.heat.mark_k;
     }
     b->run.heat.excess += against ? 0.0f : excess;
-    b->changes = fabsf(excess) > SPRING_ESTIMATOR_LIKELY_SDS * b->noise;
+    const float likely = SPRING_ESTIMATOR_LIKELY_SDS * b->noise;
+    b->changes = excess * excess * turns > likely * likely;
     b->steep = b->onset && b->changes;
     if (b->steep || !b->onset) {
         b->run.heat.flat_k = 0.0f;
@@ -302,6 +322,5 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
             spring_note_read(e, k, change, b->noise);
         }
     }
-    b->run.heat.mark_ohm = b->ohm;
-    b->run.heat.mark_k = b->run.heat.heat_k;
+    begin_step(b, ohm);
 }

@@ -53,6 +53,7 @@ void spring_jump(spring_belief_t *b, float by)
     b->slow_ohm *= by;
     if (b->heating) {
         b->run.heat.mark_ohm *= by;
+        b->run.heat.sum_ohm *= by;
         b->run.heat.onset_ohm *= by;
         b->run.heat.cold_ohm *= by;
     } else if (b->run.line.ohm > 0.0f) {

@@ -86,16 +86,19 @@ TEST(phase_is_missing_beyond_what_steps_noise_and_coefficient_explain)
     }
 }
 
-/* From austenite start on. */
+/* From austenite start on, but for 2 % of the phase, and the noise of the mean of two turns, which is
+ * no more: 0.66 mohm. */
 TEST(heating_is_over_where_its_austenite_is_read_twice)
 {
     static const struct {
         float temperature_c, change, ohm, before_ohm;
         bool over;
     } table[] = {
-        {89.0f, 0.2f, 0.201f, 0.2f, true},      {89.0f, 0.2f, 0.199f, 0.2f, false},
+        {89.0f, 0.2f, 0.201f, 0.2f, true},      {89.0f, 0.2f, 0.1988f, 0.2f, true},
+        {89.0f, 0.2f, 0.1986f, 0.2f, false},    {89.0f, -0.2f, 0.2012f, 0.2f, true},
+        {89.0f, -0.2f, 0.2014f, 0.2f, false},
         {87.0f, 0.2f, 0.201f, 0.2f, false},     {89.0f, 0.2f, 0.201f, 0.0f, false},
-        {89.0f, 0.2f, 0.201f, 0.198f, false},   {89.0f, -0.2f, 0.199f, 0.198f, false},
+        {89.0f, 0.2f, 0.201f, 0.196f, false},   {89.0f, -0.2f, 0.203f, 0.198f, true},
         {89.0f, -0.2f, 0.197f, 0.196f, true},   {89.0f, -0.2f, 0.197f, 0.0f, false},
         {88.0f, 0.2f, 0.201f, 0.2f, true},      {89.0f, 0.2f, 0.2015f, 0.2015f, true},
         {89.0f, 0.2f, 0.2017f, 0.2017f, false}, /* beyond it */
@@ -132,7 +135,7 @@ TEST(jump_of_a_heating_leaves_what_its_austenite_read_before)
         float change, by, ohm;
         bool lacks, over;
     } table[] = {
-        {0.2f, 1.1f, 0.2003f, false, true}, {0.2f, 1.1f, 0.1999f, false, false},
+        {0.2f, 1.1f, 0.1994f, false, true}, {0.2f, 1.1f, 0.1993f, false, false},
         {0.2f, 1.1f, 0.198f, true, false},  {0.2f, 1.1f, 0.207f, false, false},
         {0.2f, 1.1f, 0.212f, true, false},  {0.2f, 1.1f, 0.2203f, false, true},
         {0.2f, 0.9f, 0.2003f, false, true}, {0.2f, 0.9f, 0.178f, true, false},

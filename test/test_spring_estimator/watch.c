@@ -525,8 +525,8 @@ TEST(finish_is_heat_without_a_change)
 
 /* While it still changes, or lacks phase that it is known to have, it is no hotter than austenite
  * finish (martensite: its onset), until the coldest and heaviest would be. Where only the level of
- * its resistance says so, which a sensor's step may have moved, that stays a doubt: it may be as
- * hot as it was. */
+ * its resistance says so, it loses more than is believed; or a sensor's step has moved it: that
+ * stays a doubt, it may be as hot as it was. */
 TEST(what_still_transforms_is_no_hotter_than_that_lets_it_be)
 {
     static const struct {
@@ -547,7 +547,11 @@ TEST(what_still_transforms_is_no_hotter_than_that_lets_it_be)
         {B, false, true, false, false, 99, 9, 2.9, 0.24, 10, 99, false},
         {B, false, true, false, false, 99, 9, 2.9, 0.24, 10, 98, true},
         {B, false, true, false, false, 99, 9, 2.9, 0.25, 10, 99, true},
-        {B, false, true, false, true, 99, 9, 2.9, 0.24, 10, 99, true},
+        {B, false, true, false, true, 99, 9, 2.9, 0.24, 10, 98, true},
+        {B, false, true, false, false, 99, 9, 3, 0.24, 1.25 * (98 + 8 - 20 + 28.83) - 0.1, 98,
+         false},
+        {B, false, true, false, false, 99, 9, 3, 0.24, 1.25 * (98 + 8 - 20 + 28.83) + 0.1, 99,
+         false},
         {B, true, false, false, true, 99, 0, 1, 0.25, 1.25 * (98 + 8 - 20 + 28.83) - 0.1, 98,
          false},
         {B, true, false, false, true, 99, 0, 1, 0.25, 1.25 * (98 + 8 - 20 + 28.83) + 0.1, 99,
@@ -566,8 +570,10 @@ TEST(what_still_transforms_is_no_hotter_than_that_lets_it_be)
         begin_heating_at(table[n].c, table[n].possible, table[n].heat_k);
         row(n);
         INSIDE.run.heat.peak_k = 1e3f; /* nothing is compared */
-        INSIDE.steep = table[n].steep;
+        INSIDE.steep = INSIDE.changes = table[n].steep;
         INSIDE.blind = table[n].blind;
+        INSIDE.covariance = -0.01f;
+        const float loss_w_per_k = INSIDE.learnt.loss_w_per_k;
         INSIDE.onset = table[n].onset;
         INSIDE.learnt.austenite_ohm = table[n].learnt ? 0.25f : 0.0f;
         INSIDE.learnt.change = 0.2f;
@@ -578,9 +584,13 @@ TEST(what_still_transforms_is_no_hotter_than_that_lets_it_be)
         spring_heating_watch(&estimator, &INSIDE, &model, 0);
         NEAR(table[n].then_c, spring_now_c(&model, 0));
         const bool by_level = table[n].possible != M && !table[n].steep;
-        NEAR(by_level ? table[n].c - table[n].then_c : 0.0, spring_estimator_doubt_k(BELIEF));
+        const float over_k = by_level ? (float)(table[n].c - table[n].then_c) : 0.0f;
+        NEAR(over_k, spring_estimator_doubt_k(BELIEF));
+        NEAR(0.01f / spring_distance_k2(&INSIDE) * over_k,
+             INSIDE.learnt.loss_w_per_k - loss_w_per_k);
         TEST_ASSERT_EQUAL(table[n].then_c < table[n].c, sight()->kind == SPRING_SIGHT_TRANSFORMS);
-        TEST_ASSERT_TRUE(sight()->loss == 0 && sight()->seen == 0 && sight()->seen_sd == 0);
+        TEST_ASSERT_EQUAL(over_k > 0.0f, sight()->loss > 0);
+        TEST_ASSERT_TRUE(sight()->seen == 0 && sight()->seen_sd == 0);
     }
 }
 
