@@ -675,13 +675,22 @@ void controller_set_pattern(controller_t *controller, const bool on[])
     }
 }
 
-bool controller_set_policy(controller_t *controller, drive_policy_kind_t kind)
+bool controller_set_open(controller_t *controller, drive_policy_kind_t kind,
+                         uint16_t open_current_ma)
 {
     drive_policy_parameters_t parameters = controller->policy.parameters;
     parameters.policy = (uint8_t)kind;
+    parameters.open_current_ma = open_current_ma;
     scrub_open(&controller->scrub, controller_fixed, controller);
     const bool applied = apply_policy(controller, &parameters);
     scrub_seal(&controller->scrub, controller_fixed, controller);
+    return applied;
+}
+
+bool controller_set_policy(controller_t *controller, drive_policy_kind_t kind)
+{
+    const bool applied =
+        controller_set_open(controller, kind, controller->policy.parameters.open_current_ma);
     heed_given(controller);
     return applied;
 }

@@ -160,6 +160,10 @@ void controller_set_pattern(controller_t *controller, const bool on[]);
 /* Fails if and only if the policy does not exist in this version. With DRIVE_POLICY_OPEN the model
  * of a spring of which nothing is known is as warm as what this board has given since power-on. */
 bool controller_set_policy(controller_t *controller, drive_policy_kind_t kind);
+/* The same for a while, with another current of a spring that is fully on, and no model moves: what
+ * selftest drives with, and how it goes back. Fails as that does, or by open_current_ma's range. */
+bool controller_set_open(controller_t *controller, drive_policy_kind_t kind,
+                         uint16_t open_current_ma);
 /* Fails if and only if percent is above 100. */
 bool controller_set_fan(controller_t *controller, uint8_t percent);
 /* All levels to 0; no fault, the fan stays. */
