@@ -451,6 +451,10 @@ static void judge_circuit(controller_t *controller, uint8_t k)
 
 static void raise_ceiling(controller_t *controller, uint8_t k)
 {
+    const uint8_t bit = controller_bit_of(k);
+    if ((controller->resumed[k / 8u] & bit) != 0 && !(controller_cooling_s(controller, k) > 0.0f)) {
+        controller->resumed[k / 8u] &= (uint8_t)~bit;
+    }
     const float measured_w = 1e-6f / (float)CIRCUIT_CHECK_TICKS * (float)controller->heat_sum_uw[k];
     const float driven_w = temperature_ceiling_power_w(
         &controller->drive, 1.0f / (float)CIRCUIT_CHECK_TICKS * (float)controller->duty_sum[k],
@@ -932,11 +936,6 @@ void controller_doubt_cold(controller_t *controller)
 
 bool controller_may_be_warm(controller_t *controller)
 {
-    for (uint8_t k = 0; k < controller->springs; k++) {
-        if (!(controller_cooling_s(controller, k) > 0.0f)) {
-            controller->resumed[k / 8u] &= (uint8_t)~controller_bit_of(k);
-        }
-    }
     if (controller->ceiling.doubtful && controller_is_known(controller)) {
         controller->ceiling.doubtful = false;
     }

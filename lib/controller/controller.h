@@ -230,8 +230,8 @@ void controller_set_temperature(controller_t *controller, int16_t temperature_c7
  * spring has waited as long as it may be hot (controller_cooling_s), that hint is none of it. */
 void controller_doubt_cold(controller_t *controller);
 bool controller_is_doubtful(const controller_t *controller, uint8_t spring);
-/* Once a second: who has waited may be driven. False if all springs would be cold, were the power
- * cut now: none was given heat that has not cooled, and none is in doubt. */
+/* Once a second. False if all springs would be cold, were the power cut now: none was given heat
+ * that has not cooled, and none is in doubt. */
 bool controller_may_be_warm(controller_t *controller);
 /* By the heat that this board gave since power-on, measured, and the declared losses
  * (temperature_ceiling): too warm for the hint; how warm, degC, if it was cold before; since when
