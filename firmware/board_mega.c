@@ -450,6 +450,9 @@ int16_t board_serial_read(void)
     int16_t octet = -1;
     cli();
     if (receive_tail != receive_head) {
+        if (receive_tail == stop_head) {
+            stop_queued = false;
+        }
         octet = receive_buffer[receive_tail];
         receive_tail = (uint8_t)((receive_tail + 1u) % SERIAL_RECEIVE_BYTES);
     }
@@ -466,10 +469,7 @@ bool board_serial_before_stop(void)
 {
     bool before;
     cli();
-    if (receive_tail == stop_head) {
-        stop_queued = false;
-    }
-    before = stop_queued;
+    before = stop_queued && receive_tail != stop_head;
     sei();
     return before;
 }

@@ -9,7 +9,7 @@
 #include "flash_memory.h"
 #include "hil_frame.h"
 
-static hil_frame_decoder_t decoder;
+static hil_frame_decoder_t decoder = {.at_line_start = true};
 static hil_frame_sensors_t newest;
 static bool any;
 static uint16_t tick_now;
@@ -21,8 +21,7 @@ const char *current_sensor_name(void)
 
 void current_sensor_begin(uint8_t averaging)
 {
-    (void)averaging;
-    hil_frame_decoder_init(&decoder);
+    (void)averaging; /* the host's readings are none: a frame under way goes on */
 }
 
 bool current_sensor_hil_receive(uint8_t octet)

@@ -48,16 +48,23 @@ static ambient_t ambient;
 static controller_inputs_t inputs;
 static controller_outputs_t outputs;
 
-// Over a warm reset: the heat that was given, the model's state, and whose sensor lies: it is found
-// by what it showed before, which is lost, and whoever opens a Mega's port resets it.
+// Over a warm reset: the heat that was given, and the model's state. Not static, either.
 typedef struct {
     temperature_ceiling_t delivered;
     thermal_model_state_t state;
-    uint16_t mismatched; // a bit a spring
-    bool known;          // else the state is a guess: after the reset the board waits anew
+    bool known; // else the state is a guess: after the reset the board waits anew
     uint16_t crc;
 } kept_t;
-static kept_t kept __attribute__((section(".noinit")));
+kept_t kept __attribute__((section(".noinit")));
+
+// And whose sensor lies: it is found by what it showed before, which is lost, and whoever opens a
+// Mega's port resets it. Twice, each with its complement: at whatever write the reset comes, one is
+// whole. A bit a spring, which is never taken back.
+typedef struct {
+    uint16_t springs;
+    uint16_t not_springs;
+} liars_t;
+static volatile liars_t liars[2] __attribute__((section(".noinit")));
 
 static uint32_t last_tick_ms;
 static uint8_t tick_of_step;
@@ -134,18 +141,41 @@ static uint16_t crc_of_kept(void)
     return crc16_add_bytes(CRC16_START, &kept, offsetof(kept_t, crc));
 }
 
+static void keep_liars(void)
+{
+    uint16_t springs = 0;
+    for (uint8_t k = 0; k < controller_springs(&controller); k++) {
+        if (controller_fault(&controller, k) == SAFETY_FAULT_SENSOR_MISMATCH ||
+            controller_is_mistrusted(&controller, k)) {
+            springs |= (uint16_t)(1u << k);
+        }
+    }
+    for (volatile liars_t &copy : liars) {
+        copy.springs = springs;
+        copy.not_springs = (uint16_t)~springs;
+    }
+}
+
+static void mistrust_liars(void)
+{
+    uint16_t springs = 0;
+    for (const volatile liars_t &copy : liars) {
+        if (copy.not_springs == (uint16_t)~copy.springs) {
+            springs |= copy.springs;
+        }
+    }
+    for (uint8_t k = 0; k < controller_springs(&controller); k++) {
+        if ((springs & (uint16_t)(1u << k)) != 0) {
+            controller_mistrust(&controller, k);
+        }
+    }
+}
+
 static void keep_model(void)
 {
     controller_get_delivered(&controller, &kept.delivered);
     controller_get_model_state(&controller, &kept.state);
-    kept.known = controller_is_known(&controller);
-    kept.mismatched = 0;
-    for (uint8_t k = 0; k < controller_springs(&controller); k++) {
-        if (controller_fault(&controller, k) == SAFETY_FAULT_SENSOR_MISMATCH ||
-            controller_is_mistrusted(&controller, k)) {
-            kept.mismatched |= (uint16_t)(1u << k);
-        }
-    }
+    kept.known = controller_knows_cold(&controller);
     kept.crc = crc_of_kept();
 }
 
@@ -158,15 +188,7 @@ static void start_model(uint8_t cause)
         }
         return;
     }
-    if (kept.known) {
-        (void)controller_set_model_state(&controller, &kept.state);
-    }
-    controller_set_delivered(&controller, &kept.delivered);
-    for (uint8_t k = 0; k < controller_springs(&controller); k++) {
-        if ((kept.mismatched & (uint16_t)(1u << k)) != 0) {
-            controller_mistrust(&controller, k);
-        }
-    }
+    (void)controller_resume(&controller, &kept.delivered, kept.known ? &kept.state : nullptr);
 }
 
 // Settings, limits, or what is derived of them, are not what they were: a bit of RAM has turned
@@ -239,6 +261,7 @@ OWN_FRAME static void run_tick(uint8_t behind)
     if (++tick_of_step == 5u) {
         tick_of_step = 0;
         keep_model();
+        keep_liars();
     }
     board_watchdog_kick();
     board_hold_supply(outputs.supply); // last: a tick that does not end holds nothing
@@ -363,6 +386,9 @@ OWN_FRAME static void start(void)
     learnt_store_open(&learnt, &eeprom, SETTINGS_LEARNT_BASE, SETTINGS_LEARNT_SLOT_BYTES,
                       &controller);
     start_model(cause);
+    if (cause & BOARD_RESET_WARM) {
+        mistrust_liars();
+    }
     if (cause & (BOARD_RESET_WATCHDOG | BOARD_RESET_BROWN_OUT | BOARD_RESET_UNKNOWN)) {
         controller_lock(&controller);
     }

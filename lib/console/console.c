@@ -226,8 +226,7 @@ void console_stop(console_t *console)
         selftest_end(&console->selftest, console->controller);
     }
     if (console->job == CONSOLE_JOB_TELEMETRY || console->job == CONSOLE_JOB_INPUTS) {
-        const board_settings_t *const board = &console->settings->board; /* not off for ever */
-        (void)telemetry_set(console->telemetry, board->telemetry_format, board->telemetry_hz);
+        console_follow_board_settings(console); /* not off for ever */
     }
     if (console->job != CONSOLE_JOB_NONE && console->job != CONSOLE_JOB_SAVE &&
         console->job != CONSOLE_JOB_FORGET) {

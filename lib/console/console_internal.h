@@ -72,6 +72,8 @@ void console_open_settings(console_t *console);
 void console_seal_settings(console_t *console);
 /* Activates the settings as they are set, or says which two of them do not fit together. */
 void console_apply_settings(console_t *console);
+/* Telemetry can be set by word or as a setting: one truth, the setting. */
+void console_follow_board_settings(console_t *console);
 /* Sets one, without activating it. */
 console_error_t console_assign(console_t *console, const char *name, const char *value);
 /* As `$$` has it. */

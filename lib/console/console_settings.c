@@ -92,8 +92,7 @@ static console_error_t error_of(settings_result_t result)
     }
 }
 
-/* Telemetry and policy can be set by word or as a setting: one truth, the setting. */
-static void follow_board_settings(console_t *console)
+void console_follow_board_settings(console_t *console)
 {
     const board_settings_t *const board = &console->settings->board;
     if (console->telemetry->format != TELEMETRY_INPUTS && /* else a replay would end here */
@@ -215,7 +214,7 @@ static console_error_t assign(console_t *console, const char *name, const char *
         console->conflict) {
         console_apply_settings(console);
     }
-    follow_board_settings(console);
+    console_follow_board_settings(console);
     return CONSOLE_OK;
 }
 
@@ -262,7 +261,7 @@ console_error_t console_settings_line(console_t *console, char *line)
             return CONSOLE_ERROR_SPRINGS_ON;
         }
         console_apply_settings(console);
-        follow_board_settings(console);
+        console_follow_board_settings(console);
         return CONSOLE_OK;
     }
     if (!settings_find(line + 1, &index, &element)) {

@@ -292,8 +292,7 @@ static console_error_t word_selftest(console_t *console, const arguments_t *argu
     }
     const console_error_t error = may_drive(console);
     if (error == CONSOLE_OK) {
-        selftest_start(&console->selftest, console->controller,
-                       console->settings->controller.policy.open_current_ma);
+        selftest_start(&console->selftest, console->controller);
         console_start_job(console, CONSOLE_JOB_SELFTEST);
     }
     return error;

@@ -206,6 +206,7 @@ bool controller_init(controller_t *controller, const controller_settings_t *sett
     controller->supply_off = false;
     controller->supply_ticks = 0;
     memset(controller->mistrusted, 0, sizeof controller->mistrusted);
+    memset(controller->resumed, 0, sizeof controller->resumed);
     start(controller, settings, ambient_c7, false);
     return true;
 }
@@ -217,6 +218,23 @@ static bool apply_policy(controller_t *controller, const drive_policy_parameters
     }
     spring_estimator_prepare(&controller->estimator, &controller->model, parameters->observer != 0);
     return true;
+}
+
+/* Openly nobody waits until it is known how hot a spring is, and the model's temperature alone
+ * limits it: that is no less than what this board has given makes. */
+static void heed_given(controller_t *controller)
+{
+    thermal_model_t *const model = &controller->model;
+    if (controller->policy.parameters.policy != DRIVE_POLICY_OPEN) {
+        return;
+    }
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        const int16_t given_c7 = (int16_t)(128.0f * temperature_ceiling_c(&controller->ceiling, k));
+        if (controller_cooling_s(controller, k) > 0.0f &&
+            given_c7 > thermal_model_temperature_c7(model, k)) {
+            thermal_model_set_temperature(model, k, given_c7);
+        }
+    }
 }
 
 /* Of a spring, by the model that is declared until now. */
@@ -252,14 +270,9 @@ static bool declare(controller_t *controller, const thermal_model_parameters_t *
     return true;
 }
 
-static uint8_t bit_of(uint8_t spring)
-{
-    return (uint8_t)(1u << (spring & 7u));
-}
-
 bool controller_is_mistrusted(const controller_t *controller, uint8_t spring)
 {
-    return (controller->mistrusted[spring / 8u] & bit_of(spring)) != 0;
+    return (controller->mistrusted[spring / 8u] & controller_bit_of(spring)) != 0;
 }
 
 static bool is_same_circuit(const current_control_parameters_t *a,
@@ -315,6 +328,7 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         }
         if ((other & (MODEL_PART | POLICY_PART)) != 0) {
             (void)apply_policy(controller, &settings->policy);
+            heed_given(controller);
         }
         scrub_seal(&controller->scrub, controller_fixed, controller); /* all of it is new */
         return true;
@@ -334,6 +348,7 @@ bool controller_restart(controller_t *controller, const controller_settings_t *s
     }
     thermal_model_set_fan(&controller->model, 0); /* as it is initialised; the next step tells */
     controller->supply_ticks = 0;
+    memset(controller->resumed, 0, sizeof controller->resumed);
     start_anew(controller, settings, true);
     return true;
 }
@@ -436,6 +451,10 @@ static void judge_circuit(controller_t *controller, uint8_t k)
 
 static void raise_ceiling(controller_t *controller, uint8_t k)
 {
+    const uint8_t bit = controller_bit_of(k);
+    if ((controller->resumed[k / 8u] & bit) != 0 && !(controller_cooling_s(controller, k) > 0.0f)) {
+        controller->resumed[k / 8u] &= (uint8_t)~bit;
+    }
     const float measured_w = 1e-6f / (float)CIRCUIT_CHECK_TICKS * (float)controller->heat_sum_uw[k];
     const float driven_w = temperature_ceiling_power_w(
         &controller->drive, 1.0f / (float)CIRCUIT_CHECK_TICKS * (float)controller->duty_sum[k],
@@ -572,7 +591,8 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma,
     bool allowed[CONTROLLER_MAX_SPRINGS];
     for (uint8_t k = 0; k < controller->springs; k++) {
         allowed[k] = controller->supply_ticks == SUPPLY_TICKS &&
-                     safety_allows(&controller->safety, k) && controller_is_sound(controller);
+                     safety_allows(&controller->safety, k) && controller_is_sound(controller) &&
+                     !controller_waits_anew(controller, k);
         if (!allowed[k]) {
             current_control_reset(&controller->current, k);
         }
@@ -659,13 +679,23 @@ void controller_set_pattern(controller_t *controller, const bool on[])
     }
 }
 
-bool controller_set_policy(controller_t *controller, drive_policy_kind_t kind)
+bool controller_set_open(controller_t *controller, drive_policy_kind_t kind,
+                         uint16_t open_current_ma)
 {
     drive_policy_parameters_t parameters = controller->policy.parameters;
     parameters.policy = (uint8_t)kind;
+    parameters.open_current_ma = open_current_ma;
     scrub_open(&controller->scrub, controller_fixed, controller);
     const bool applied = apply_policy(controller, &parameters);
     scrub_seal(&controller->scrub, controller_fixed, controller);
+    return applied;
+}
+
+bool controller_set_policy(controller_t *controller, drive_policy_kind_t kind)
+{
+    const bool applied =
+        controller_set_open(controller, kind, controller->policy.parameters.open_current_ma);
+    heed_given(controller);
     return applied;
 }
 
@@ -759,7 +789,7 @@ void controller_clear_faults(controller_t *controller)
         const safety_fault_t fault = safety_fault(&controller->safety, k);
         stays[k] = controller_clear_wait_s(controller, k) != 0 ? fault : SAFETY_FAULT_NONE;
         if (heats_when_cleared(fault)) {
-            controller->mistrusted[k / 8u] |= bit_of(k);
+            controller->mistrusted[k / 8u] |= controller_bit_of(k);
         }
         if (fault != SAFETY_FAULT_NONE && stays[k] == SAFETY_FAULT_NONE) {
             circuit_peers_clear(&controller->peers, k, fault == SAFETY_FAULT_SENSOR_MISMATCH);
@@ -779,7 +809,7 @@ void controller_clear_faults(controller_t *controller)
 void controller_mistrust(controller_t *controller, uint8_t spring)
 {
     safety_trip(&controller->safety, spring, SAFETY_FAULT_SENSOR_MISMATCH);
-    controller->mistrusted[spring / 8u] |= bit_of(spring);
+    controller->mistrusted[spring / 8u] |= controller_bit_of(spring);
 }
 
 void controller_lock(controller_t *controller)
@@ -793,10 +823,15 @@ void controller_unlock(controller_t *controller)
     safety_unlock(&controller->safety);
 }
 
+static bool is_warm_or_in_doubt(const controller_t *controller, uint8_t spring)
+{
+    return controller_is_warm(controller, spring) || controller_is_doubtful(controller, spring);
+}
+
 static bool any_is_warm(const controller_t *controller)
 {
     for (uint8_t k = 0; k < controller->springs; k++) {
-        if (controller_is_warm(controller, k) || controller_is_doubtful(controller, k)) {
+        if (is_warm_or_in_doubt(controller, k)) {
             return true;
         }
     }
@@ -813,30 +848,24 @@ bool controller_is_known(const controller_t *controller)
     return true;
 }
 
+bool controller_knows_cold(const controller_t *controller)
+{
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        if (!controller_is_warm(controller, k) && controller_cooling_s(controller, k) > 0.0f) {
+            return false;
+        }
+    }
+    return true;
+}
+
 void controller_get_model_state(const controller_t *controller, thermal_model_state_t *state)
 {
     thermal_model_get_state(&controller->model, state);
 }
 
-bool controller_set_model_state(controller_t *controller, const thermal_model_state_t *state)
-{
-    if (any_is_warm(controller) || !thermal_model_set_state(&controller->model, state)) {
-        return false;
-    }
-    spring_estimator_trust_model(&controller->estimator, &controller->model);
-    temperature_ceiling_raise(&controller->ceiling, &controller->model);
-    tell_resistances(controller);
-    return true;
-}
-
 void controller_get_delivered(const controller_t *controller, temperature_ceiling_t *delivered)
 {
     *delivered = controller->ceiling;
-}
-
-void controller_set_delivered(controller_t *controller, const temperature_ceiling_t *delivered)
-{
-    controller->ceiling = *delivered;
 }
 
 /* By way of martensite. */
@@ -847,6 +876,37 @@ static void cool_to(thermal_model_t *model, uint8_t k, int16_t temperature_c7)
     thermal_model_set_temperature(model, k, temperature_c7);
 }
 
+bool controller_resume(controller_t *controller, const temperature_ceiling_t *delivered,
+                       const thermal_model_state_t *state)
+{
+    thermal_model_t *const model = &controller->model;
+    controller->ceiling = *delivered;
+    if (delivered->delivered || delivered->doubtful) {
+        spring_estimator_doubt(&controller->estimator);
+    }
+    int16_t unknown_c7[CONTROLLER_MAX_SPRINGS];
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        unknown_c7[k] = thermal_model_temperature_c7(model, k);
+    }
+    const bool taken = state != NULL && thermal_model_set_state(model, state);
+    if (taken) {
+        temperature_ceiling_raise(&controller->ceiling, model);
+    }
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        if (controller_is_warm(controller, k)) {
+            controller->resumed[k / 8u] |= controller_bit_of(k);
+        }
+        if (taken && is_warm_or_in_doubt(controller, k)) {
+            cool_to(model, k, unknown_c7[k]);
+        } else if (taken) {
+            spring_estimator_trust_spring(&controller->estimator, model, k);
+        }
+    }
+    heed_given(controller);
+    tell_resistances(controller);
+    return taken;
+}
+
 void controller_set_temperature(controller_t *controller, int16_t temperature_c7)
 {
     if (!any_is_warm(controller)) { /* then air and plate are not, either */
@@ -855,9 +915,8 @@ void controller_set_temperature(controller_t *controller, int16_t temperature_c7
     }
     bool guesses = false; /* of a spring that is in doubt: no heat that was given */
     for (uint8_t k = 0; k < controller->springs; k++) {
-        const bool in_doubt = controller_is_doubtful(controller, k);
-        guesses = guesses || in_doubt;
-        if (in_doubt || controller_is_warm(controller, k)) {
+        guesses = guesses || controller_is_doubtful(controller, k);
+        if (is_warm_or_in_doubt(controller, k)) {
             continue;
         }
         cool_to(&controller->model, k, temperature_c7);

@@ -72,6 +72,8 @@ typedef struct {
     uint8_t supply_ticks; /* that the supply has been held, up to those that a relay takes */
     /* a bit a spring: it had SAFETY_FAULT_SENSOR_MISMATCH or _STUCK_ON, cleared since */
     uint8_t mistrusted[(CONTROLLER_MAX_SPRINGS + 7) / 8];
+    /* it was warm as the board was reset, and has not waited since: no look at it, either */
+    uint8_t resumed[(CONTROLLER_MAX_SPRINGS + 7) / 8];
     current_control_t current; /* what is before it outlives another size of the array */
     safety_t safety;
     spring_estimator_t estimator; /* what is believed; it alone corrects the model */
@@ -155,8 +157,13 @@ bool controller_is_sound(const controller_t *controller);
 bool controller_set_target(controller_t *controller, uint8_t spring, uint16_t level_permille);
 /* All springs at once: level 1000 where on[spring], else 0. */
 void controller_set_pattern(controller_t *controller, const bool on[]);
-/* Fails if and only if the policy does not exist in this version. */
+/* Fails if and only if the policy does not exist in this version. With DRIVE_POLICY_OPEN the model
+ * of a spring of which nothing is known is as warm as what this board has given since power-on. */
 bool controller_set_policy(controller_t *controller, drive_policy_kind_t kind);
+/* The same for a while, with another current of a spring that is fully on, and no model moves: what
+ * selftest drives with, and how it goes back. Fails as that does, or by open_current_ma's range. */
+bool controller_set_open(controller_t *controller, drive_policy_kind_t kind,
+                         uint16_t open_current_ma);
 /* Fails if and only if percent is above 100. */
 bool controller_set_fan(controller_t *controller, uint8_t percent);
 /* All levels to 0; no fault, the fan stays. */
@@ -197,17 +204,23 @@ void controller_lock(controller_t *controller);
 /* Levels are set to 0: nothing starts by unlocking. */
 void controller_unlock(controller_t *controller);
 
-/* What the model remembers, to be kept over a warm reset: worth it once all springs are known, as
- * until then its temperatures are guesses that a reset must not make certain. */
+/* No spring may still be hot from before power-on; or none but what this board has warmed since. */
 bool controller_is_known(const controller_t *controller);
+bool controller_knows_cold(const controller_t *controller);
+/* What the model remembers, and the heat that this board has given since power-on, whatever is
+ * known of the springs: to be kept over a warm reset. */
 void controller_get_model_state(const controller_t *controller, thermal_model_state_t *state);
-/* False, and nothing changed, if and only if the state is not one this model could be in, or a
- * spring is warm by what this board has given since it started. */
-bool controller_set_model_state(controller_t *controller, const thermal_model_state_t *state);
-/* The heat that this board has given since power-on, to be kept over a warm reset whatever is known
- * of the springs; given back after the model's state, with the same settings of size. */
 void controller_get_delivered(const controller_t *controller, temperature_ceiling_t *delivered);
-void controller_set_delivered(controller_t *controller, const temperature_ceiling_t *delivered);
+/* Gives them back, after controller_init with the same settings of size. state is NULL where
+ * controller_knows_cold was false: then its temperatures are guesses, which a reset must not make
+ * certain. Air, plate and what is cold are as they were. A spring that is warm, by state or
+ * delivered, waits as after power-on, and no look at what it reads ends that: what would tell that
+ * its sensor has begun to lie is lost, and by its readings alone a hold would go on at any
+ * temperature. (By DRIVE_POLICY_OPEN nothing waits:
+ * see controller_set_policy.) False, nothing but delivered taken, if and only if the state is NULL
+ * or none that this model could be in. */
+bool controller_resume(controller_t *controller, const temperature_ceiling_t *delivered,
+                       const thermal_model_state_t *state);
 /* A hint: springs, air and plate are taken to be at one temperature, reached from cold. It takes
  * away what is not known of the time before power-on, and no heat that this board gave: a spring
  * that is warm by that keeps its temperature and all that is believed of it, and then air and plate

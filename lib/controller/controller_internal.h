@@ -21,6 +21,18 @@ static inline uint16_t controller_positive_mv(int16_t voltage_mv)
     return voltage_mv > 0 ? (uint16_t)voltage_mv : 0u;
 }
 
+static inline uint8_t controller_bit_of(uint8_t spring)
+{
+    return (uint8_t)(1u << (spring & 7u));
+}
+
+/* It was warm as the board was reset, and is driven by no belief until it has cooled. */
+static inline bool controller_waits_anew(const controller_t *controller, uint8_t spring)
+{
+    return (controller->resumed[spring / 8u] & controller_bit_of(spring)) != 0 &&
+           controller->policy.parameters.policy != DRIVE_POLICY_OPEN;
+}
+
 /* A scrub_stretches_t of a controller_t. */
 scrub_stretch_t controller_fixed(const void *owner, uint8_t index);
 

@@ -142,7 +142,11 @@ safety_fault_t controller_board_fault(const controller_t *controller)
 
 uint16_t controller_limits(const controller_t *controller, uint8_t spring)
 {
-    return drive_policy_limits(&controller->policy, spring);
+    const uint16_t limits = drive_policy_limits(&controller->policy, spring);
+    return (limits & DRIVE_POLICY_LIMIT_SAFETY) != 0 && controller_waits_anew(controller, spring) &&
+                   safety_allows(&controller->safety, spring)
+               ? DRIVE_POLICY_LIMIT_COOLING
+               : limits;
 }
 
 uint16_t controller_cut_ma(const controller_t *controller, uint8_t spring)

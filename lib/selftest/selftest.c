@@ -1,25 +1,23 @@
 #include "selftest.h"
 
-void selftest_start(selftest_t *selftest, controller_t *controller, uint16_t open_current_ma)
+void selftest_start(selftest_t *selftest, controller_t *controller)
 {
-    *selftest = (selftest_t){.policy = (uint8_t)controller_policy(controller)};
-    selftest->level_permille = 1000u;
-    if (open_current_ma > SELFTEST_CURRENT_MA) {
-        selftest->level_permille =
-            (uint16_t)((uint32_t)SELFTEST_CURRENT_MA * 1000u / open_current_ma);
-    }
-    (void)controller_set_policy(controller, DRIVE_POLICY_OPEN); /* a level is a current */
+    const drive_policy_parameters_t *const p = &controller->policy.parameters;
+    *selftest = (selftest_t){.open_current_ma = p->open_current_ma, .policy = p->policy};
+    (void)controller_set_open(controller, DRIVE_POLICY_OPEN, SELFTEST_CURRENT_MA);
 }
 
 static void judge(const controller_t *controller, uint8_t spring, uint8_t sensor,
                   selftest_result_t *result)
 {
     const int16_t current_ma = controller_measured_ma(controller, spring);
+    const uint16_t half_ma = controller_target_ma(controller, spring) / 2u;
+    const uint16_t least_ma = half_ma > SELFTEST_LEAST_MA ? half_ma : SELFTEST_LEAST_MA;
     *result = (selftest_result_t){.spring = spring,
                                   .sensor = (controller_sensor_status_t)sensor,
                                   .fault = controller_fault(controller, spring)};
     result->sound = result->sensor == CONTROLLER_SENSOR_OK && result->fault == SAFETY_FAULT_NONE &&
-                    current_ma > (int16_t)(SELFTEST_CURRENT_MA / 2u);
+                    current_ma > (int16_t)least_ma;
     if (result->sound) {
         const int16_t voltage_mv = controller_measured_mv(controller, spring);
         result->resistance_mohm = (int32_t)voltage_mv * 1000 / current_ma;
@@ -38,7 +36,7 @@ selftest_step_t selftest_step(selftest_t *selftest, controller_t *controller, ui
         return SELFTEST_ENDED;
     }
     if (!selftest->driven) {
-        (void)controller_set_target(controller, spring, selftest->level_permille);
+        (void)controller_set_target(controller, spring, DRIVE_POLICY_LEVEL_FULL);
         selftest->since_tick = tick;
         selftest->driven = true;
         return SELFTEST_WAITS;
@@ -57,5 +55,6 @@ selftest_step_t selftest_step(selftest_t *selftest, controller_t *controller, ui
 void selftest_end(selftest_t *selftest, controller_t *controller)
 {
     controller_stop(controller);
-    (void)controller_set_policy(controller, (drive_policy_kind_t)selftest->policy);
+    (void)controller_set_open(controller, (drive_policy_kind_t)selftest->policy,
+                              selftest->open_current_ma);
 }

@@ -13,15 +13,18 @@
 extern "C" {
 #endif
 
-#define SELFTEST_CURRENT_MA 300u
-#define SELFTEST_TICKS      30u /* 0.6 s: the current has settled, the spring warmed by 0.1 K */
+#define SELFTEST_CURRENT_MA 300u /* or what its limits leave of that */
+#define SELFTEST_LEAST_MA                                                                          \
+    50u                    /* less tells nothing: offsets of the readings are 10 mA and 25 mV      \
+                            */
+#define SELFTEST_TICKS 30u /* 0.6 s: the current has settled, the spring warmed by 0.1 K */
 
 typedef struct {
     uint32_t since_tick;
-    uint16_t level_permille;
+    uint16_t open_current_ma; /* to go back to */
     uint8_t spring;
     uint8_t failures;
-    uint8_t policy; /* drive_policy_kind_t to go back to */
+    uint8_t policy; /* drive_policy_kind_t, also */
     bool driven;    /* the spring whose turn it is */
 } selftest_t;
 
@@ -36,12 +39,11 @@ typedef struct {
     controller_sensor_status_t sensor;
     safety_fault_t fault;
     int32_t resistance_mohm; /* 0 unless sound */
-    bool sound;              /* sensor valid, no fault, at least half of the current */
+    bool sound; /* sensor valid, no fault, at least half of the current that is asked for */
 } selftest_result_t;
 
-/* Nothing may be driven. open_current_ma: of a fully driven spring under DRIVE_POLICY_OPEN, which
- * is the policy until the end. */
-void selftest_start(selftest_t *selftest, controller_t *controller, uint16_t open_current_ma);
+/* Nothing may be driven. Until the end the policy is DRIVE_POLICY_OPEN, with that current. */
+void selftest_start(selftest_t *selftest, controller_t *controller);
 /* Call it once a tick or more often. tick counts control ticks; sensor_status of each spring is
  * controller_sensor_status_t of the last one. Divides where it judges. */
 selftest_step_t selftest_step(selftest_t *selftest, controller_t *controller, uint32_t tick,

@@ -322,16 +322,13 @@ void loop_advance(loop_t *loop, double seconds)
 static void boot(loop_t *loop, bool keeps_memory)
 {
     thermal_model_state_t state;
-    const bool known = controller_is_known(&loop->controller);
+    const bool known = controller_knows_cold(&loop->controller);
     controller_get_model_state(&loop->controller, &state);
     temperature_ceiling_t delivered;
     controller_get_delivered(&loop->controller, &delivered);
     (void)controller_init(&loop->controller, &loop->settings, told_ambient_c7(loop), NULL);
-    if (keeps_memory && known) {
-        (void)controller_set_model_state(&loop->controller, &state);
-    }
     if (keeps_memory) {
-        controller_set_delivered(&loop->controller, &delivered);
+        (void)controller_resume(&loop->controller, &delivered, known ? &state : NULL);
     }
     controller_lock(&loop->controller);
 }

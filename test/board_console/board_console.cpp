@@ -6,6 +6,7 @@
 
 #include "board_test.h"
 #include "console_codes.h"
+#include "hil_frame.h"
 
 using namespace board_test;
 
@@ -169,6 +170,36 @@ TEST(averaging_is_set_while_it_runs)
             TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, seen.spring[k].fault);
             TEST_ASSERT_INT_WITHIN(60, 1500, seen.spring[k].measured_ma);
         }
+    }
+}
+
+/* With hardware in the loop frames are taken beside the console: one that had a stop ahead of it
+ * hid where that was, and what came next was dropped with error:12; and another averaging ended a
+ * frame under way, whose rest was then a line. At any moment of a tick. */
+TEST(in_the_loop_a_line_behind_a_frame_is_obeyed)
+{
+    rig mega(elf("firmware_hil.elf"));
+    mega.boot(false);
+    hil_frame_sensors_t sensors{};
+    sensors.springs = HIL_FRAME_MAX_SPRINGS;
+    char line[HIL_FRAME_MAX_LINE];
+    const std::string frame(line, hil_frame_encode_sensors(&sensors, line));
+    const auto is_obeyed = [&mega](const std::string &sent, double ms) {
+        here("%.20s after %.2f ms", sent.c_str(), ms);
+        mega.board.take_output();
+        mega.board.send(sent);
+        mega.run_ms(60.0);
+        const std::string said = mega.board.take_output(); /* between the frames of its own */
+        expect_in(said, "ok\r\n");
+        TEST_ASSERT_FALSE_MESSAGE(contains(said, "error"), said.c_str());
+    };
+    constexpr double STEP_MS = 0.25;
+    for (int n = 0; n < 80; ++n) {
+        for (const std::string &sent :
+             {"!" + frame + "clear\n", "$sensor_averaging=16\n" + frame}) {
+            try_from_here([&] { is_obeyed(sent, STEP_MS * n); });
+        }
+        mega.run_ms(STEP_MS);
     }
 }
 

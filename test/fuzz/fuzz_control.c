@@ -45,8 +45,7 @@ static void command(uint8_t what, fuzz_t *fuzz)
         controller_get_delivered(&controller, &delivered);
         controller_get_model_state(&controller, &state);
         HOLDS(controller_init(&controller, &settings.controller, 20 * 128, NULL));
-        (void)controller_set_model_state(&controller, &state);
-        controller_set_delivered(&controller, &delivered);
+        (void)controller_resume(&controller, &delivered, (k & 1u) != 0 ? &state : NULL);
         break;
     case 10: /* other settings, refused or not */
         for (unsigned n = 0; n < 3u; n++) {

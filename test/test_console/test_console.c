@@ -610,10 +610,26 @@ TEST(selftest_gives_the_policy_back_also_when_it_is_stopped)
     receive("selftest\n");
     console_service(&console);
     TEST_ASSERT_EQUAL(DRIVE_POLICY_OPEN, controller_policy(&controller));
-    TEST_ASSERT_EQUAL_UINT16(200, controller_level_permille(&controller, 0));
+    TEST_ASSERT_EQUAL_UINT16(1000, controller_level_permille(&controller, 0));
+    TEST_ASSERT_EQUAL_UINT16(SELFTEST_CURRENT_MA, controller.policy.parameters.open_current_ma);
     console_stop(&console);
     TEST_ASSERT_EQUAL(DRIVE_POLICY_PRECOMPENSATE, controller_policy(&controller));
     TEST_ASSERT_EQUAL_UINT16(0, controller_level_permille(&controller, 0));
+    TEST_ASSERT_EQUAL_UINT16(1500, controller.policy.parameters.open_current_ma);
+}
+
+/* It was asked for what open_current_a is, and was not sound with 0.15 A of it or less. */
+TEST(selftest_finds_a_sound_board_sound_whatever_current_was_set)
+{
+    static const char *const sets[] = {"$open_current_a=0", "$open_current_a=0.15",
+                                       "$open_current_a=3.2", "$maximum_current_a=0.12"};
+    for (unsigned k = 0; k < sizeof sets / sizeof *sets; k++) {
+        expect_ok(sets[k]);
+        expect_ok("selftest");
+    }
+    expect_ok("$maximum_current_a=0.04"); /* which tells nothing of a spring */
+    ask("selftest");
+    expect_said("spring 1: sensor ok, too little current\r");
 }
 
 TEST(nothing_is_said_without_room_and_a_stop_drops_what_had_begun)
