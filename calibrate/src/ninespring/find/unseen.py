@@ -163,23 +163,26 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, n
         return off, off
     plant = problem.plant_for(spec, fitted.values)
 
-    def off_in(ambient: np.ndarray) -> np.ndarray:
-        return (run.temperature_c - simulate_run(plant.copy(), run, ambient))[split.counts]
+    def off_in(ambient: np.ndarray, share: float) -> np.ndarray:
+        begun = replace(run, around_share=share)
+        return (run.temperature_c - simulate_run(plant.copy(), begun, ambient))[split.counts]
 
     if run.ambient_c is not None:
         over_k = room.over_logged_k(values, fitted.stderr() if beside else {}) or 0.0
         seen_s = max(one.duration_s for one in problem.runs)
-        off = off_in(run.ambient_c + room.beside_log_k(run, over_k, seen_s, settles_s(plant, run.springs)))
+        ambient = run.ambient_c + room.beside_log_k(run, over_k, seen_s, settles_s(plant, run.springs))
+        off = off_in(ambient, room.around_of(run, plant, float(ambient[0]), room.LOGGED_K))
         return off, off
-    told, sigma = _room(problem, run, values, plant)
+    told, sigma, around = _room(problem, run, values, plant)
     ambient = np.full(len(run.time_s), told)
-    off = off_in(ambient)
+    off = off_in(ambient, around)
     alike = max(1.0, BLOCK_S / float(np.median(np.diff(run.time_s))))
-    return off, room.without(off, off - off_in(ambient + 1.0), math.hypot(sigma, room.MOVES_K), alike)
+    return off, room.without(off, off - off_in(ambient + 1.0, around), math.hypot(sigma, room.MOVES_K), alike)
 
 
-def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> tuple[float, float]:
-    """Return how warm the room of a run was and one sigma of it, as `predict` tells it by the runs that were fitted."""
+def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> tuple[float, float, float]:
+    """Return how warm the room of a run was, one sigma of it and how warm what was around its springs, as `predict` tells it by the runs
+    that were fitted."""
     rooms = {r: values[f"ambient_c@{r + 1}"] for r in range(len(problem.runs)) if f"ambient_c@{r + 1}" in values}
     return room.Rooms.of([problem.begun(r, values) for r in rooms], list(rooms.values()), plant).told(run, plant)
 
