@@ -42,6 +42,14 @@ def cooling(around: dict[str, dict[str, float]]) -> tuple[Model, Run]:
     return model, Run("run", "", time_s, "power", drive, shown, np.zeros(ROWS), np.full(ROWS, ROOM_C))
 
 
+def beside_cold(model: Model, run: Run) -> np.ndarray:
+    """Return what a run's springs would show with no heat around them as it begins, (rows, springs)."""
+    plant = prediction.plant_of(model)
+    plant.reset()
+    plant.start_from_measured(run.temperature_c[0])
+    return plant.simulate(run.time_s, native.POWER, run.drive, run.fan, run.ambient_c)
+
+
 @pytest.mark.parametrize(
     "around",
     [
@@ -55,11 +63,7 @@ def test_what_is_around_springs_that_begin_hot_is_warm(around: dict[str, dict[st
     model, run = cooling(around)
     assert np.abs(run.temperature_c - prediction.predict(model, run)).max() < 0.05
     # with no heat around them at first they would be colder for minutes
-    plant = prediction.plant_of(model)
-    plant.reset()
-    plant.start_from_measured(run.temperature_c[0])
-    bare = plant.simulate(run.time_s, native.POWER, run.drive, run.fan, run.ambient_c)
-    assert np.abs(run.temperature_c - bare).max() > 1.5
+    assert np.abs(run.temperature_c - beside_cold(model, run)).max() > 1.5
 
 
 def test_holders_keep_an_array_warm_for_as_long_as_they_hold_heat() -> None:
@@ -252,10 +256,7 @@ def test_where_others_were_warmed_together_a_run_as_warm_is_not_at_rest() -> Non
 def test_what_is_around_springs_that_were_warmed_shortly_before_is_told_by_the_run() -> None:
     """A minute of heat warms no plate: one as warm as beside springs held so for long is not what the readings show."""
     model, run = cooling({"plate_conduction": PLATE})
-    plant = prediction.plant_of(model)
-    plant.reset()
-    plant.start_from_measured(run.temperature_c[0])
-    shown = plant.simulate(run.time_s, native.POWER, run.drive, run.fan, run.ambient_c)
+    shown = beside_cold(model, run)
     rng = np.random.default_rng(1)
     fresh = replace(run, temperature_c=shown + rng.normal(0.0, 0.05, shown.shape))
     soaked = replace(run, temperature_c=run.temperature_c + rng.normal(0.0, 0.05, shown.shape))
@@ -273,11 +274,7 @@ def test_what_is_around_springs_that_were_warmed_shortly_before_is_told_by_the_r
 def test_how_warm_it_is_around_springs_of_another_run_is_told_by_its_first_minute() -> None:
     """Of springs that begin warm others say little: one beside what is cold loses more at once. A run left out is judged so, too."""
     model, soaked = cooling({"plate_conduction": PLATE})
-    plant = prediction.plant_of(model)
-    plant.reset()
-    plant.start_from_measured(soaked.temperature_c[0])
-    shown = plant.simulate(soaked.time_s, native.POWER, soaked.drive, soaked.fan, soaked.ambient_c)
-    fresh = replace(soaked, temperature_c=shown)
+    fresh = replace(soaked, temperature_c=beside_cold(model, soaked))
     for others, run in ((1.0, fresh), (0.0, soaked)):
         model.provenance = {"around_share": others}
         assert np.abs(run.temperature_c - prediction.predict(model, run)).max() < 0.2
@@ -285,7 +282,8 @@ def test_how_warm_it_is_around_springs_of_another_run_is_told_by_its_first_minut
         assert np.abs(run.temperature_c - prediction.predict(model, unlogged)).max() < 1.0
     rng = np.random.default_rng(1)
     runs = [
-        replace(one, temperature_c=one.temperature_c + rng.normal(0.0, 0.05, shown.shape)) for one in (fresh, soaked)
+        replace(one, temperature_c=one.temperature_c + rng.normal(0.0, 0.05, one.drive.shape))
+        for one in (fresh, soaked)
     ]
     problem, found, _ = fit_effects(Array(1, 2), runs, ["plate_conduction"])
     for split in unseen.splits(problem):
