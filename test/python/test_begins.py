@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ninespring.find import doubt
+from ninespring.find import doubt, unseen
 from ninespring.find.diagnosis import fit_effects
 from ninespring.infer import predict as prediction
 from ninespring.infer import room
@@ -18,7 +18,7 @@ from ninespring.io.logs import log_text, read_log
 from ninespring.io.logs.run import Run
 from ninespring.model import effects, native
 from ninespring.model.models import Array, Model
-from ninespring.model.simulate import settles_s
+from ninespring.model.simulate import settles_s, simulate_run
 from plants import a_plant
 
 ROWS, ROOM_C, HELD_W = 900, 20.0, 0.35
@@ -42,6 +42,14 @@ def cooling(around: dict[str, dict[str, float]]) -> tuple[Model, Run]:
     return model, Run("run", "", time_s, "power", drive, shown, np.zeros(ROWS), np.full(ROWS, ROOM_C))
 
 
+def beside_cold(model: Model, run: Run) -> np.ndarray:
+    """Return what a run's springs would show with no heat around them as it begins, (rows, springs)."""
+    plant = prediction.plant_of(model)
+    plant.reset()
+    plant.start_from_measured(run.temperature_c[0])
+    return plant.simulate(run.time_s, native.POWER, run.drive, run.fan, run.ambient_c)
+
+
 @pytest.mark.parametrize(
     "around",
     [
@@ -55,11 +63,7 @@ def test_what_is_around_springs_that_begin_hot_is_warm(around: dict[str, dict[st
     model, run = cooling(around)
     assert np.abs(run.temperature_c - prediction.predict(model, run)).max() < 0.05
     # with no heat around them at first they would be colder for minutes
-    plant = prediction.plant_of(model)
-    plant.reset()
-    plant.start_from_measured(run.temperature_c[0])
-    bare = plant.simulate(run.time_s, native.POWER, run.drive, run.fan, run.ambient_c)
-    assert np.abs(run.temperature_c - bare).max() > 1.5
+    assert np.abs(run.temperature_c - beside_cold(model, run)).max() > 1.5
 
 
 def test_holders_keep_an_array_warm_for_as_long_as_they_hold_heat() -> None:
@@ -92,7 +96,7 @@ def test_what_holds_heat_for_weeks_is_in_balance_with_springs_that_begin_hot(
     model.parameters = {"ambient_c": ROOM_C} | kept
     plant = prediction.plant_of(model)
     begun_c = run.temperature_c[0] - ROOM_C
-    shown = prediction.predict(model, run)[:400] - ROOM_C
+    shown = simulate_run(plant.copy(), run, run.ambient_c)[:400] - ROOM_C
     if effect == "shared_air":  # which is as warm as they are, and all that they lose heat to
         assert np.abs(shown - begun_c).max() < 0.02 * begun_c.max()
     else:  # and they come to rest where it keeps them, against the room
@@ -252,10 +256,7 @@ def test_where_others_were_warmed_together_a_run_as_warm_is_not_at_rest() -> Non
 def test_what_is_around_springs_that_were_warmed_shortly_before_is_told_by_the_run() -> None:
     """A minute of heat warms no plate: one as warm as beside springs held so for long is not what the readings show."""
     model, run = cooling({"plate_conduction": PLATE})
-    plant = prediction.plant_of(model)
-    plant.reset()
-    plant.start_from_measured(run.temperature_c[0])
-    shown = plant.simulate(run.time_s, native.POWER, run.drive, run.fan, run.ambient_c)
+    shown = beside_cold(model, run)
     rng = np.random.default_rng(1)
     fresh = replace(run, temperature_c=shown + rng.normal(0.0, 0.05, shown.shape))
     soaked = replace(run, temperature_c=run.temperature_c + rng.normal(0.0, 0.05, shown.shape))
@@ -268,6 +269,26 @@ def test_what_is_around_springs_that_were_warmed_shortly_before_is_told_by_the_r
     assert not any(
         "around" in f.key for c in effects.candidates(scene_of(Problem(Array(1, 2), [cold]))) for f in c.free
     )
+
+
+def test_how_warm_it_is_around_springs_of_another_run_is_told_by_its_first_minute() -> None:
+    """Of springs that begin warm others say little: one beside what is cold loses more at once. A run left out is judged so, too."""
+    model, soaked = cooling({"plate_conduction": PLATE})
+    fresh = replace(soaked, temperature_c=beside_cold(model, soaked))
+    for others, run in ((1.0, fresh), (0.0, soaked)):
+        model.provenance = {"around_share": others}
+        assert np.abs(run.temperature_c - prediction.predict(model, run)).max() < 0.2
+        unlogged = replace(run, ambient_c=None)
+        assert np.abs(run.temperature_c - prediction.predict(model, unlogged)).max() < 1.0
+    rng = np.random.default_rng(1)
+    runs = [
+        replace(one, temperature_c=one.temperature_c + rng.normal(0.0, 0.05, one.drive.shape))
+        for one in (fresh, soaked)
+    ]
+    problem, found, _ = fit_effects(Array(1, 2), runs, ["plate_conduction"])
+    for split in unseen.splits(problem):
+        off, judged = unseen.errors(split, found, None)
+        assert np.sqrt(np.mean(off**2)) < 0.2 and np.array_equal(off, judged)
 
 
 def test_a_room_that_would_lie_beyond_where_its_run_began_is_said() -> None:

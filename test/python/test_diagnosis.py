@@ -12,7 +12,7 @@ import pytest
 from command import ninespring
 from made import an_effect
 from ninespring.export.settings import left_out
-from ninespring.find import diagnosis
+from ninespring.find import diagnosis, search
 from ninespring.find.certainty import CERTAIN, Witness, witness
 from ninespring.infer.declared import base_spec
 from ninespring.infer.fit import Fit
@@ -198,6 +198,7 @@ def test_what_the_same_readings_say_of_another_is_not_certain() -> None:
         )
         diagnosis.share_with([entry], [rival], 0.06)
         assert (entry.certainty == "probable" and entry.probability < 0.5) == shared
+        assert (entry.certainty == "certain") == (evidence > search.TOLD_APART)
         assert ("Or: Spring 5 loses 30" in entry.text and "only in combination" in entry.text) == shared
 
 

@@ -13,13 +13,14 @@ from ninespring.find import diagnosis, evidence
 from ninespring.infer.declared import base_spec
 from ninespring.infer.fit import Fit
 from ninespring.infer.problem import FOLDS, Problem, fold_of_rows
+from ninespring.infer.result import model_of, parameters_of
 from ninespring.infer.scene import scene_of
 from ninespring.io import statistics
 from ninespring.io.logs import read_log
 from ninespring.io.logs.run import Run
 from ninespring.model import effects, native
-from ninespring.model.models import Array
-from plants import a_plant
+from ninespring.model.models import Array, Model
+from plants import a_plant, levels
 
 TRUE = {
     "heat_capacity_j_per_k": 0.3,
@@ -249,3 +250,24 @@ def test_what_rounding_of_a_boards_voltages_leaves_is_no_structure_and_heat_besi
     at = [free.key for free in by_board.spec.free].index("loss_w_per_k")
     few, many = (np.sqrt(one.covariance[at, at]) for one in (by_meter, by_board))
     assert many > 1.5 * few and abs(off) < 3.0 * many < 0.01
+
+
+def test_what_heaters_of_unknown_power_radiate_is_not_held_to_black_springs() -> None:
+    """Commands tell watts in proportion to a declared heat capacity: as black as a declared surface of springs is no bound of heaters, and at
+    it a power law, which still air is, would be called certain instead."""
+    numbers = {"heat_capacity_j_per_k": 1.0, "loss_w_per_k": 0.004, "surface_mm2": 900.0, "emissivity": 1.0}
+    plant = a_plant((1, 2), ["radiation"], numbers | {"command_power_w": 0.6, "ambient_c": 20.0})
+    rng = np.random.default_rng(4)
+    command = np.repeat(levels(rng), 2, axis=0)
+    time_s, still, room_c = np.arange(1200.0), np.zeros(1200), np.full(1200, 20.0)
+    shown = plant.simulate(time_s, native.COMMAND, command, still, room_c) + rng.normal(0.0, 0.1, command.shape)
+    run = Run("run", "", time_s, "command", command, shown, still, room_c)
+    declared = Model(Array(1, 2), parameters={"heat_capacity_j_per_k": 1.0, "loss_w_per_k": 0.01})
+    problem, fit, _ = diagnosis.fit_effects(Array(1, 2), [run], ["radiation"], model=declared)
+    _, other, _ = diagnosis.fit_effects(Array(1, 2), [run], ["natural_convection"], model=declared)
+    assert evidence.log_evidence(problem, fit, other) > 10.0
+    model = model_of(problem, fit, problem.runs)
+    assert model.parameters["emissivity"] * model.parameters["surface_mm2"] == pytest.approx(900.0, rel=0.05)
+    assert not fit.at_bounds()
+    said = effects.sentence("radiation", parameters_of(problem, fit, "radiation"), "")
+    assert said.startswith("Heat radiates away as from ")

@@ -150,7 +150,7 @@ def test_a_first_minute_counts_as_far_as_those_of_the_fitted_runs_told_their_roo
         run.temperature_c[:] = simulate_run(lags.copy(), run, np.full(len(run.time_s), at))
     known = room.Rooms.of(runs[:3], rooms[:3], plain)
     trusting = replace(known, misses_k=0.0).told(runs[3], plain)
-    value, sigma = known.told(runs[3], plain)
+    value, sigma, _ = known.told(runs[3], plain)
     assert abs(value - 25.0) < 2.0 * sigma < 3.0 and 25.0 - trusting[0] > 5.0 * trusting[1]
     assert room.Rooms.of(runs[:3], rooms[:3], lags).misses_k < 0.3 < 2.0 < known.misses_k
 

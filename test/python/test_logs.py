@@ -60,7 +60,10 @@ SLOW = "".join(f"{500 * n},{n // 100 % 2},{20.0 + 0.1 * (n % 7):g}\n" for n in r
         (HEADER + "0,1,20\n1,,20\n2,1,20\n", 3, "empty"),
         (HEADER + "0,1,20\n1,1\n", 3, "cut off"),
         (HEADER + "0,1,20\n1,1,20,5\n2,1,20\n", 3, "a decimal comma? write 20.5, not 20,5"),
+        (HEADER + "0,1,20,\n1,1,20,\n2,1,20,\n", 2, "a comma too many at its end"),
+        (HEADER + "s,A,degC\n0,1,20\n1,1,20\n2,1,20\n", (2, 1), "a line of words under the names: delete it"),
         ("time_s;i1_a;t1_c\n0;1,5;20,1\n", 1, "semicolons"),
+        ("time_s i1_a t1_c\n0 1.5 20.1\n", (1, 7), "separated by spaces"),
         ("time_s,i1_ma,t1_c\n0,1,20\n", 1, "unknown column"),
         ("time_s,i1_a,t1_f\n0,1,68\n", 1, "unknown column"),
         ("time_s,i1_a,i1_a,t1_c\n0,1,1,20\n", 1, "twice"),
@@ -106,6 +109,11 @@ def test_a_run_that_begins_warm_in_degc_is_no_fahrenheit(tmp_path: Path) -> None
         ("time_s,i1_a,weather", 13, "note_"),
         ("time_s,i65_a,t1_c", 8, "64 springs"),
         ("time_s,i1_a,,t1_c", 13, "no name"),
+        ("time_s,i1_a,t1_c,", 18, "a comma too many at the end of the line?"),
+        ("TIME_S,i1_a,t1_c", 1, "name it time_s"),
+        ("Time (s),i1_a,t1_c", 1, "name it time_s"),
+        ("time_s,i1_a,T1 [degC]", 13, "name it t1_c"),
+        ("time_s,i1_a,T1 [F]", 13, "convert with (F - 32) / 1.8, and name it t1_c"),
     ],
 )
 def test_a_column_with_another_s_name_is_refused_with_what_to_do(
@@ -114,6 +122,16 @@ def test_a_column_with_another_s_name_is_refused_with_what_to_do(
     error = refused(tmp_path, header + "\n0,0,0,0\n")
     assert (error.line, error.column) == (1, column)
     assert advice in error.message
+
+
+def test_what_a_thermometer_says_of_a_failed_reading_is_no_temperature(tmp_path: Path) -> None:
+    """-127 of a chip that did not answer, 1372 of an open thermocouple: one cell in a hundred has no other unit."""
+    rows = [f"{t},{t % 60 // 30},{20 + t % 60 / 10 if t not in (50, 150) else -127}\n" for t in range(300)]
+    run = read(tmp_path, HEADER + "".join(rows))
+    assert np.flatnonzero(np.isnan(run.temperature_c[:, 0])).tolist() == [50, 150]
+    assert "t1_c: 2 cells that no spring can have left out, the first -127 degC in line 52" in run.notes
+    error = refused(tmp_path, HEADER + "".join(row.replace("22.0", "-127") for row in rows))
+    assert "not a spring's temperature" in error.message
 
 
 def test_repeated_rows_are_dropped_and_said(tmp_path: Path) -> None:

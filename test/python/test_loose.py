@@ -168,3 +168,15 @@ def test_a_number_has_the_error_that_was_computed_or_none(tmp_path: Path, monkey
     assert told.stderr()["loss_w_per_k"] == pytest.approx(plain.stderr()["loss_w_per_k"], rel=0.05)
     monkeypatch.undo()
     assert diagnosis.with_everything(problem, bare, replace(plain, sse=math.inf)).covariance is None
+
+
+@pytest.mark.parametrize(("minutes", "is_loose"), [(0.0, True), (1.0, False)])
+def test_what_comes_within_a_minute_is_no_step(tmp_path: Path, minutes: float, is_loose: bool) -> None:
+    """Heat that wanders makes a thermometer's share of what the model has, too, and evenly: 1.3 % of a board's was told as a loose one."""
+    runs = [two_springs(tmp_path / f"{seed}.csv", seed, holder_w_per_k=0.0) for seed in (11, 1)]
+    share = np.interp(
+        np.arange(800.0), [COMES - 0.5 - 30.0 * minutes, COMES - 0.5 + 30.0 * minutes + 1e-9], [1.0, 0.97]
+    )
+    runs[1].temperature_c[:, 1] = 20.0 + share * (runs[1].temperature_c[:, 1] - 20.0)
+    found = loose.find(*fitted(runs))
+    assert (found is not None) is is_loose

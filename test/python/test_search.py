@@ -87,6 +87,15 @@ def with_one_after_the_other(found: search.Search, *names: str) -> Fit:
     return fit
 
 
+def test_what_was_fitted_on_the_way_is_a_rival_however_many_promised_more(make_log) -> None:
+    """A power law for what radiates: five promised more along a line, and nothing was said of it, 5 nats behind what was called certain."""
+    found = searched(read_log(make_log(effects={"radiation": {"emissivity": 0.9}})))
+    radiation = with_one_after_the_other(found, "radiation")
+    assert found.rivals(radiation, {"radiation": found.base}, most=0) == []
+    air = with_one_after_the_other(found, "natural_convection")
+    assert found.rivals(radiation, {"radiation": found.base}, most=0) == [("radiation", air)]
+
+
 def test_quick_heaters_with_slow_thermometers_are_not_taken_for_slow_ones_that_a_camera_sees(tmp_path: Path) -> None:
     """What heats a neighbour is as quick as the heaters are: the readings follow together, as if each were a mean of both."""
     time_s, drive = 2.0 * np.arange(600.0), levels(np.random.default_rng(3))

@@ -254,24 +254,24 @@ def _another_law(one: Fit, other: Fit, effect: str) -> bool:
 
 
 def share_with(listed: Sequence[results.Effect], rivals: Sequence[results.Rival], same_c: float) -> None:
-    """Share what speaks for a named effect with rivals that show the same readings: only the two in combination are fixed.
+    """Share what speaks for a named effect with rivals that show the same readings: only the two in combination are fixed. None is certain
+    beside another that is not told apart.
 
     That one of them has fewer numbers makes it simpler, not truer.
     """
     for entry in listed:
-        alike = [
-            one
-            for one in rivals
-            if one.instead_of == entry.name and one.evidence < search.TOLD_APART and one.predictions_differ_c < same_c
-        ]
+        untold = [one for one in rivals if one.instead_of == entry.name and one.evidence < search.TOLD_APART]
+        if any(one.name != entry.name for one in untold):
+            entry.probability, entry.certainty = min(entry.probability, PROBABLE), "probable"
+        alike = [one for one in untold if one.predictions_differ_c < same_c]
         if not alike:
             continue
         instead = [effects.sentence(one.name, one.parameters, one.variant or "") for one in alike]
         if others := sum(one.name != entry.name for one in alike):  # by another law it is the same name
             entry.probability /= 1 + others
             entry.certainty = "probable"
-        untold = "fix them only in combination" if others else "do not tell which"
-        entry.text += f" Or: {' Or: '.join(instead)} These readings {untold}."
+        how = "fix them only in combination" if others else "do not tell which"
+        entry.text += f" Or: {' Or: '.join(instead)} These readings {how}."
 
 
 def candidates_of(found: search.Search, final: Fit, base: Fit) -> list[results.Candidate]:

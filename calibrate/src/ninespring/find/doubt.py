@@ -137,7 +137,7 @@ def into_model(model: Model, problem: Problem, fit: Fit, doubts: Sequence[str]) 
         table = native.parameter_table()
         for name in model.stderr:
             known = table[name.partition("[")[0]]
-            if known.unit.split("/")[0] in POWER_UNITS or known.name == "emissivity":
+            if known.unit.split("/")[0] in POWER_UNITS or known.name in ("emissivity", "surface_mm2"):
                 model.kept[name] = f"{scale[0]}: it is {scale[1]}"
     model.kept |= {name: why for name, why in _of_springs(problem, fit).items() if name in model.parameters}
 

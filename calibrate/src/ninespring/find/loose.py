@@ -31,6 +31,8 @@ MOST = 4
 """Windows that are left out, one after the other, at most: where more would help, the model is wrong, not the thermometers."""
 AROUND = 3
 """Times that a window is looked for, beside numbers that it spoilt less each time."""
+AT_STEP = 30
+"""Rows before and after an end of a window by which its step is judged."""
 LATE_S = (0.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 """By which a thermometer may be late: it then comes loose as late."""
 FADES = 4.0
@@ -94,6 +96,9 @@ def find(problem: Problem, final: Fit) -> Loose | None:
         return None
     window, fit, rival = found
     at_step = _at_its_step(problem, fit, window)
+    chosen_from = math.log(problem.count * len(LATE_S))
+    if _nats_of_steps(problem, fit, at_step) - chosen_from < LEAST_NATS:
+        return None  # heat that wanders bends there, and makes none
     beside = _beside(problem, fit, _column(problem, at_step))
     off, left = (max(0.0, one.sse - one.count) for one in (final, beside))
     if off - left < SHARE * off:
@@ -101,7 +106,7 @@ def find(problem: Problem, final: Fit) -> Loose | None:
     nats = _nats(problem, beside, _column(problem, at_step))
     whole = column_of(problem, fit, window.cause, 1.0)
     without = max(_nats(problem, final, None), _nats(problem, _beside(problem, fit, whole), whole))
-    if nats - math.log(problem.count * len(LATE_S)) - without < LEAST_NATS:
+    if nats - chosen_from - without < LEAST_NATS:
         return None
     # chosen from about as many
     if rival is not None and nats <= _nats(problem, _beside(problem, final, rival), rival):
@@ -237,6 +242,26 @@ def _at_its_step(problem: Problem, fit: Fit, window: Hidden) -> Loose:
     came = float(run.time_s[begin])
     since = came - first, min(last, float(run.time_s[-1])) - first
     return Loose(r, k, cause.kind, (begin, end), profile, since, (came - step_s if begin else -math.inf, last + late))
+
+
+def _nats_of_steps(problem: Problem, fit: Fit, one: Loose) -> float:
+    """Return the nats by which a window's ends show it by themselves: beside what stays or goes on evenly in the rows around each."""
+    run, mask, k = problem.runs[one.run], problem.mask[one.run], one.spring
+    left = problem.without_errors(problem.evaluate(fit).residual)[one.run][:, k] / problem.noise[one.run][k]
+    nats = 0.0
+    for row in one.rows:
+        rows = slice(max(0, row - AT_STEP), row + AT_STEP)
+        there = mask[rows, k]
+        if not 0 < row < len(left) or there.sum() < AT_STEP:
+            continue
+        since_s = (run.time_s[rows] - run.time_s[row])[there]
+        columns = np.column_stack([np.ones(len(since_s)), since_s, one.profile[rows, k][there]])
+        even, step = (
+            float(np.sum((left[rows][there] - part @ np.linalg.lstsq(part, left[rows][there], rcond=None)[0]) ** 2))
+            for part in (columns[:, :2], columns)
+        )
+        nats += 0.5 * (even - step) / max(1.0, step / len(since_s))
+    return nats
 
 
 def _near(row: int, grid: int, least: int, most: int) -> range:

@@ -386,7 +386,11 @@ class Search:
                 name = screen.candidates[k].effect
                 # where something flexible took up something slow, a linear forecast says too little of a slow node
                 slow = own is not None and own.flexible and screen.candidates[k].slow_node
-                if name in seen or (not slow and (len(seen) >= most or drop < 0.5 * needed)) or not self.goes_on():
+                # and of what was fitted on the way its fit says more
+                fitted = self.fits.get(self.key(screen.candidates[k].added_to(other.spec)))
+                wanted = slow or (len(seen) < most and drop >= 0.5 * needed)
+                known = fitted is not None and other.chi2 - fitted.chi2 >= 0.5 * needed
+                if name in seen or not (known or (wanted and self.goes_on())):
                     continue
                 seen.add(name)
                 self.progress(f"could it be {name} instead of {effect}?")

@@ -127,14 +127,16 @@ def _hardly_shown(whole: Fit, part: Fit, kept: Sequence[int]) -> list[str]:
     ]
 
 
+def held(spec: Spec, at: dict[str, float]) -> Spec:
+    """Return a spec whose numbers with these keys stay at these values."""
+    return replace(spec, free=tuple(replace(f, start=at[f.key], prior=PINNED) if f.key in at else f for f in spec.free))
+
+
 def pinned(fit: Fit) -> Fit:
     """Return a fit, made beside what has no name, whose effects stay as large as they were found: only the declared numbers,
     and those of a run alone, are free to take that up."""
-    free = [
-        f if f.effect is None or f.run is not None else replace(f, start=float(v), prior=PINNED)
-        for f, v in zip(fit.spec.free, fit.values, strict=True)
-    ]
-    return replace(fit, spec=replace(fit.spec, free=tuple(free)))
+    found = {f.key for f in fit.spec.free if f.effect is not None and f.run is None}
+    return replace(fit, spec=held(fit.spec, {key: v for key, v in fit.as_dict().items() if key in found}))
 
 
 def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, np.ndarray]:
@@ -150,11 +152,8 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, n
     fitted = problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS, errors=beside)
     # what only the left-out run shows, these do not tell: it stays, and what is known beside it alone goes with it
     if known := {key: start[key] for key in (*fitted.stuck, *_hardly_shown(fit, fitted, kept)) if key in start}:
-        held = tuple(replace(f, start=known[f.key], prior=PINNED) if f.key in known else f for f in spec.free)
-        beside_them = replace(spec, free=held)
-        fitted = problem.fit(
-            beside_them, fitted.as_dict() | known, tolerance=1e-3, max_steps=STEPS, errors=beside, near=fitted
-        )
+        start = fitted.as_dict() | known
+        fitted = problem.fit(held(spec, known), start, tolerance=1e-3, max_steps=STEPS, errors=beside, near=fitted)
     run, values = split.left_out, fitted.as_dict()
     if (share := room.around_share(values)) is not None:
         run = replace(run, around_share=share)
@@ -163,23 +162,26 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, n
         return off, off
     plant = problem.plant_for(spec, fitted.values)
 
-    def off_in(ambient: np.ndarray) -> np.ndarray:
-        return (run.temperature_c - simulate_run(plant.copy(), run, ambient))[split.counts]
+    def off_in(ambient: np.ndarray, share: float) -> np.ndarray:
+        begun = replace(run, around_share=share)
+        return (run.temperature_c - simulate_run(plant.copy(), begun, ambient))[split.counts]
 
     if run.ambient_c is not None:
         over_k = room.over_logged_k(values, fitted.stderr() if beside else {}) or 0.0
         seen_s = max(one.duration_s for one in problem.runs)
-        off = off_in(run.ambient_c + room.beside_log_k(run, over_k, seen_s, settles_s(plant, run.springs)))
+        ambient = run.ambient_c + room.beside_log_k(run, over_k, seen_s, settles_s(plant, run.springs))
+        off = off_in(ambient, room.around_of(run, plant, float(ambient[0]), room.LOGGED_K))
         return off, off
-    told, sigma = _room(problem, run, values, plant)
+    told, sigma, around = _room(problem, run, values, plant)
     ambient = np.full(len(run.time_s), told)
-    off = off_in(ambient)
+    off = off_in(ambient, around)
     alike = max(1.0, BLOCK_S / float(np.median(np.diff(run.time_s))))
-    return off, room.without(off, off - off_in(ambient + 1.0), math.hypot(sigma, room.MOVES_K), alike)
+    return off, room.without(off, off - off_in(ambient + 1.0, around), math.hypot(sigma, room.MOVES_K), alike)
 
 
-def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> tuple[float, float]:
-    """Return how warm the room of a run was and one sigma of it, as `predict` tells it by the runs that were fitted."""
+def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> tuple[float, float, float]:
+    """Return how warm the room of a run was, one sigma of it and how warm what was around its springs, as `predict` tells it by the runs
+    that were fitted."""
     rooms = {r: values[f"ambient_c@{r + 1}"] for r in range(len(problem.runs)) if f"ambient_c@{r + 1}" in values}
     return room.Rooms.of([problem.begun(r, values) for r in rooms], list(rooms.values()), plant).told(run, plant)
 

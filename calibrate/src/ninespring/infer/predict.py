@@ -46,32 +46,36 @@ def chip_lines(model: Model) -> tuple[str, str]:
 
 def in_its_room(model: Model, run: Run) -> Run:
     """Return a run without an ambient with the one that its first minute tells, one whose room is not where it was logged
-    with where it is, and say so; others as they are."""
-    known = model.provenance
-    if (share := known.get("around_share", run.around_share)) != run.around_share:
-        run = replace(run, around_share=share)
-    if run.ambient_c is not None:
-        over_k = known.get("room_over_logged_k", 0.0)
-        if run.room_told or not over_k:
-            return run
-        seen_s = known.get("room_over_logged_s", math.inf)
-        beside_k = room.beside_log_k(run, over_k, seen_s, settles_s(plant_of(model), run.springs))
-        said = (
-            f"what springs lose heat to is taken to be {abs(over_k):.1f} K {'warmer' if over_k > 0 else 'colder'} than "
-            "ambient_c says, as it was in what the model was fitted to"
-        )
-        if abs(beside_k[-1]) < LESS * abs(over_k):
-            said += f"; {abs(beside_k[-1]):.1f} K at the end, as those runs took {seen_s:.0f} s and did not show how long it lasts"
-        return replace(run, ambient_c=run.ambient_c + beside_k, notes=[*run.notes, said], room_told=True)
-    if room.begun(run) is None:
+    with where it is, one that begins warm with how warm what is around its springs was, and say so; others as they are."""
+    if run.room_told:
         return run
-    plant = plant_of(model)
-    over = known.get("room_over_first_k"), known.get("room_over_first_sigma_k")
-    spread_k, misses_k = known.get("room_spread_k", room.ROOMS_K), known.get("room_first_minute_misses_k", 0.0)
-    told = room.Rooms(plant.get("ambient_c"), spread_k, None if None in over else over, misses_k)
-    value, sigma = told.told(run, plant)
-    said = f"no ambient_c: by the first minute the room is at {value:.1f} degC (+-{sigma:.1f})"
-    return replace(run, ambient_c=np.full(len(run.time_s), value), notes=[*run.notes, said], room_told=True)
+    known, plant, notes = model.provenance, plant_of(model), []
+    if (usual := known.get("around_share", run.around_share)) != run.around_share:
+        run = replace(run, around_share=usual)
+    share = usual
+    if run.ambient_c is not None:
+        if over_k := known.get("room_over_logged_k", 0.0):
+            seen_s = known.get("room_over_logged_s", math.inf)
+            beside_k = room.beside_log_k(run, over_k, seen_s, settles_s(plant, run.springs))
+            said = (
+                f"what springs lose heat to is taken to be {abs(over_k):.1f} K {'warmer' if over_k > 0 else 'colder'} than "
+                "ambient_c says, as it was in what the model was fitted to"
+            )
+            if abs(beside_k[-1]) < LESS * abs(over_k):
+                said += f"; {abs(beside_k[-1]):.1f} K at the end, as those runs took {seen_s:.0f} s and did not show how long it lasts"
+            run, notes = replace(run, ambient_c=run.ambient_c + beside_k), [said]
+        share = room.around_of(run, plant, float(run.ambient_c[0]), room.LOGGED_K)
+    elif room.begun(run) is not None:
+        over = known.get("room_over_first_k"), known.get("room_over_first_sigma_k")
+        spread_k, misses_k = known.get("room_spread_k", room.ROOMS_K), known.get("room_first_minute_misses_k", 0.0)
+        told = room.Rooms(plant.get("ambient_c"), spread_k, None if None in over else over, misses_k)
+        value, sigma, share = told.told(run, plant)
+        notes = [f"no ambient_c: by the first minute the room is at {value:.1f} degC (+-{sigma:.1f})"]
+        run = replace(run, ambient_c=np.full(len(run.time_s), value))
+    if share != run.around_share:
+        notes.append(f"it begins warm: by the first minute what is around its springs has {share:.0%} of their warmth")
+        run = replace(run, around_share=share)
+    return replace(run, notes=[*run.notes, *notes], room_told=True) if notes else run
 
 
 def predict(model: Model, run: Run, chip: bool = False) -> np.ndarray:

@@ -102,6 +102,8 @@ class Problem:
         base.set_all(array_parameters(array))
         base.set_all(self.declared)
         self._base = base
+        self._plants: dict[Any, native.Plant] = {}
+        """With effects on, by which and what is fixed with them."""
 
     def base_value(self, name: str) -> float:
         """Return what the declared array has for a parameter of the plant."""
@@ -184,6 +186,8 @@ class Problem:
             ambient = ambient + values.get(f"{AMBIENT_OFFSET}@{run_index + 1}", values.get(AMBIENT_OFFSET, 0.0))
         for name, hats in self.hats.items():
             prefix = f"{name}@{run_index + 1}."
+            if f"{prefix}1" not in values:
+                continue
             drift = [values.get(f"{prefix}{k}", 0.0) for k in range(1, hats[run_index].shape[1] + 1)]
             if any(drift):
                 if ambient is None:
@@ -199,9 +203,13 @@ class Problem:
         settings = spec.settings(values, self._base.get)
         if alloy.shut(settings):
             raise native.NativeError(native.OUTSIDE, "the alloy's loop")
-        plant = self._base.copy()
-        plant.set_effects(spec.plant_effects)
-        plant.set_all(dict(spec.fixed))
+        is_on = spec.plant_effects, spec.fixed
+        if is_on not in self._plants:
+            plant = self._base.copy()
+            plant.set_effects(spec.plant_effects)
+            plant.set_all(dict(spec.fixed))
+            self._plants[is_on] = plant
+        plant = self._plants[is_on].copy()
         plant.set_all(settings)
         if run_index is not None and self.runs[run_index].mode == "command" and RUN_DRIVE in spec.effects:
             gain = dict(zip((f.key for f in spec.free), values, strict=True))[f"{DRIVE_GAIN}@{run_index + 1}"]

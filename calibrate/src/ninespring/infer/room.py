@@ -21,7 +21,7 @@ from ..model import native
 from ..model.effects.ambient_drift import MOST_K_PER_H
 from ..model.simulate import WARM_K as BEGINS_WARM_K
 from ..model.simulate import fades_per_s, hidden_k, simulate_run
-from ..model.spec import AMBIENT_OFFSET, AROUND_SHARE, SENSOR_OFFSET
+from ..model.spec import AMBIENT_OFFSET, AROUND, AROUND_SHARE, SENSOR_OFFSET
 
 FIRST_S = 60.0
 """Of a run, what it is told by."""
@@ -31,6 +31,10 @@ DRIVE_OFF = 0.03
 """Part by which a drive is usually off, one sigma: it must not count as a room's."""
 LOSS_OFF = 0.1
 """Part of a warm spring's loss that may be another node's: a room is told so much worse by one that begins warm."""
+SHARE_OFF = 0.5
+"""How far what is around springs that begin warm is from what it was in other runs, one sigma: some were warmed for long, others shortly before."""
+LOGGED_K = 0.5
+"""How far what springs lose heat to is from where it was logged, one sigma."""
 ROOMS_K = 3.0
 """How far a room is from what it was on another day, one sigma."""
 ANYWHERE_K = 100.0
@@ -306,40 +310,72 @@ def begun(run: Run) -> Run | None:
     return run.part(slice(end))
 
 
+Shows = Callable[[Run, float, np.ndarray], np.ndarray]
+"""Simulates a run with a room, degC, and errors of its first readings, (springs,), K."""
+
+
+def _by_first_minute(
+    part: Run, room_c: float, other: Sequence[np.ndarray], trust: Sequence[float], shows: Shows, fades: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return how much of what numbers change, which makes of a first minute these `other` ones, its readings show, and the covariance.
+
+    Least squares of these, believed to be 0 as firmly as `trust` says, of the drive's errors, which are believed to be small, and of those
+    of the start: noise, and what a thermometer that lags hides of a spring that `fades` (1/s) towards its room.
+    """
+    noise = np.nan_to_num(statistics.noise_floor(part.temperature_c), nan=0.1)
+    noise = np.maximum(np.maximum(noise, statistics.rounding(part.temperature_c)), 0.02)
+    there, springs = np.isfinite(part.temperature_c), part.springs
+    base = shows(part, room_c, np.zeros(springs))
+    moved = [one - base for one in other]
+    weaker = replace(part, drive=part.drive * (1.0 - DRIVE_OFF))  # a command is 1 at most
+    moved.append((base - shows(weaker, room_c, np.zeros(springs))) / DRIVE_OFF)
+    moved += [shows(part, room_c, one) - base for one in np.eye(springs)]
+    start = np.hypot(noise, hidden_k(part, room_c, fades))
+    weight = np.array([*trust, 1.0 / DRIVE_OFF, *(1.0 / start)])
+    scale = noise * math.sqrt(FEWER)
+    columns = np.column_stack([(one / scale)[there] for one in moved])
+    left = ((part.temperature_c - base) / scale)[there]
+    spread = np.linalg.inv(columns.T @ columns + np.diag(weight**2))
+    return spread @ (columns.T @ left), spread
+
+
+def around_of(run: Run, plant: native.Plant, room_c: float, sigma_k: float) -> float:
+    """Return what part of its springs' warmth what is around them had as a run began warm, by its first minute and what is believed before
+    it (the run's `around_share`), its room known to `sigma_k`: a spring beside what is cold loses more at first."""
+    part, believed = begun(run), run.around_share
+    hottest_c = float(np.nanmax(run.temperature_c[0], initial=room_c))
+    if part is None or run.warm or hottest_c <= room_c + BEGINS_WARM_K or not any(map(plant.has, AROUND)):
+        return believed
+    shows = _shows(plant)
+    far = 0.0 if believed > 0.5 else 1.0
+    none = np.zeros(run.springs)
+    other = [shows(replace(part, around_share=far), room_c, none), shows(part, room_c + 1.0, none)]
+    trust = [abs(far - believed) / SHARE_OFF, 1.0 / sigma_k]
+    off, _ = _by_first_minute(part, room_c, other, trust, shows, fades_per_s(plant))
+    return float(np.clip(believed + off[0] * (far - believed), 0.0, 1.0))
+
+
 def of_run(
     run: Run,
     guess: Sequence[Guess],
-    shows: Callable[[Run, float, np.ndarray], np.ndarray],
+    shows: Shows,
     fades: float,
     misses_k: float = 0.0,
 ) -> tuple[float, float]:
     """Return how warm the room of a run is and one sigma of it, by its first minute, which tells rooms no better than to `misses_k`,
     and guesses before it.
 
-    `shows` simulates a run with a room (degC) and errors of the first readings (springs,), K. Least squares of the room, of the
-    drive's errors, which are believed to be small, and of those of the start: noise, and what a thermometer that lags hides of a
-    spring that `fades` (1/s) towards its room.
+    `shows` simulates a run with a room (degC) and errors of the first readings (springs,), K.
     """
     part, usual = begun(run), _moments(guess)
     if part is None:
         return usual
-    noise = np.nan_to_num(statistics.noise_floor(part.temperature_c), nan=0.1)
-    noise = np.maximum(np.maximum(noise, statistics.rounding(part.temperature_c)), 0.02)
-    there = np.isfinite(part.temperature_c)
-    (value, sigma), springs = usual, run.springs
+    value, sigma = usual
     for _ in range(2):  # what heats is not straight, but nearly
-        base = shows(part, value, np.zeros(springs))
-        moved = [shows(part, value + 1.0, np.zeros(springs)) - base]
-        weaker = replace(part, drive=part.drive * (1.0 - DRIVE_OFF))  # a command is 1 at most
-        moved.append((base - shows(weaker, value, np.zeros(springs))) / DRIVE_OFF)
-        moved += [shows(part, value, one) - base for one in np.eye(springs)]
-        start = np.hypot(noise, hidden_k(part, value, fades))
-        trust = np.array([1e-6, 1.0 / DRIVE_OFF, *(1.0 / start)])  # nothing of the room: what the readings alone say
-        scale = noise * math.sqrt(FEWER)
-        columns = np.column_stack([(one / scale)[there] for one in moved])
-        left = ((part.temperature_c - base) / scale)[there]
-        spread = np.linalg.inv(columns.T @ columns + np.diag(trust**2))
-        said = value + float((spread @ (columns.T @ left))[0])
+        warmer = [shows(part, value + 1.0, np.zeros(run.springs))]
+        # nothing is believed of the room: what the readings alone say
+        off, spread = _by_first_minute(part, value, warmer, [1e-6], shows, fades)
+        said = value + float(off[0])
         variance = (
             float(spread[0, 0]) + (LOSS_OFF * max(0.0, np.nanmax(part.temperature_c[0]) - usual[0])) ** 2 + misses_k**2
         )
@@ -385,13 +421,22 @@ class Rooms:
             usual, spread_k(ambient_c), over_first(runs, ambient_c), statistics.rms([np.array(off)]) if off else 0.0
         )
 
-    def told(self, run: Run, plant: native.Plant) -> tuple[float, float]:
-        """Return how warm the room of a run is and one sigma of it, as a fitted plant shows its first minute."""
-        return _shown(run, plant, guessed(run, self.usual_c, self.over, self.spread_k), self.misses_k)
+    def told(self, run: Run, plant: native.Plant) -> tuple[float, float, float]:
+        """Return how warm the room of a run is and one sigma of it, as a fitted plant shows its first minute, and how warm what is around
+        springs that begin warm."""
+        guess = guessed(run, self.usual_c, self.over, self.spread_k)
+        value, sigma = _shown(run, plant, guess, self.misses_k)
+        if (share := around_of(run, plant, value, sigma)) != run.around_share:
+            value, sigma = _shown(replace(run, around_share=share), plant, guess, self.misses_k)
+        return value, sigma, share
 
 
 def _shown(run: Run, plant: native.Plant, guess: Sequence[Guess], misses_k: float = 0.0) -> tuple[float, float]:
-    def shows(part: Run, ambient_c: float, offset: np.ndarray) -> np.ndarray:
-        return simulate_run(plant.copy(), part, np.full(len(part.time_s), ambient_c), offset)
+    return of_run(run, guess, _shows(plant), fades_per_s(plant), misses_k)
 
-    return of_run(run, guess, shows, fades_per_s(plant), misses_k)
+
+def _shows(plant: native.Plant) -> Shows:
+    def shows(part: Run, room_c: float, offset: np.ndarray) -> np.ndarray:
+        return simulate_run(plant.copy(), part, np.full(len(part.time_s), room_c), offset)
+
+    return shows

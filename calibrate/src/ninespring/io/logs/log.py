@@ -80,17 +80,28 @@ NAMES_OF = (
 
 
 def _advice(name: str) -> str:
+    plain = re.sub(r"[\s_]*[(\[]\W*(\w+)[)\]]", r"_\1", name).lower()  # Time (s), T1 [°C]
+    if COLUMN.match(plain):
+        return f"name it {plain}"
     for other, ours, todo in NAMES_OF:
-        if found := re.fullmatch(other, name, re.IGNORECASE):
+        if found := re.fullmatch(other, plain):
             return f"{todo},{'' if todo.startswith('if ') else ' and'} name it {ours.format(*found.groups())}"
     return "a log has time_s, i1_a, v1_v, u1, t1_c, f1_n ..., fan, ambient_c; note_... is skipped"
 
 
-def _check_range(table: Table, name: str, kind: str) -> None:
+def _check_range(table: Table, name: str, kind: str, notes: list[str]) -> None:
     low, high, unit, advice = LIMITS[kind]
     values = table.frame[name].to_numpy()
-    bad = np.flatnonzero((values < low) | (values > high))
-    if bad.size:
+    beyond = (values < low) | (values > high)
+    bad = np.flatnonzero(beyond)
+    if kind == "t" and 0 < bad.size <= mending.FEW * len(values):
+        # what a thermometer's chip says of a reading that failed (-127, 1372): no unit is wrong of one cell in a hundred
+        first = f"{values[bad[0]]:g} degC in line {table.lines[bad[0]]}"
+        notes.append(
+            f"{name}: {bad.size} cell{'s' * (bad.size > 1)} that no spring can have left out, the first {first}"
+        )
+        table.frame[name] = np.where(beyond, np.nan, values)
+    elif bad.size:
         if values[bad[0]] < low and abs(values[bad[0]]) <= high:
             advice = BELOW.get(kind, advice)
         said = f"{name} = {values[bad[0]]:g} {unit}".rstrip()
@@ -169,8 +180,8 @@ def read_log(
     wanted = temperatures and not (or_resistance and {"i", "v"} <= kinds and "t" not in kinds)
     letter, count, has_voltages = _driving_columns(table, springs, wanted, why)
     table.read_rows()
-    _check_cells(table)
     notes: list[str] = []
+    _check_cells(table, notes)
     frame = _kept_rows(table, notes)
     run = _run_of(table, frame, letter, count, has_voltages, notes)
     without = [str(k) for k in range(1, count + 1) if f"t{k}_c" not in frame]
@@ -193,12 +204,12 @@ def read_log(
     return run
 
 
-def _check_cells(table: Table) -> None:
-    """Refuse a number out of its range, or an empty cell where something must stand."""
+def _check_cells(table: Table, notes: list[str]) -> None:
+    """Refuse a number out of its range, or an empty cell where something must stand; leave a few temperatures out that are none."""
     for name in table.names:
         if EXTRA.match(name):
             continue
-        _check_range(table, name, name if name in LIMITS else name[0])
+        _check_range(table, name, name if name in LIMITS else name[0], notes)
         if name == "time_s" or name[0] in "iuvf":
             holes = np.flatnonzero(table.frame[name].isna().to_numpy())
             if holes.size:

@@ -80,6 +80,8 @@ class Table:
             if (found := line.count(",") + 1) != cells:
                 missing = "a cell is missing: leave it empty between two commas"
                 advice = "cut off here?" if row == len(body) - 1 else DECIMAL_COMMA if found > cells else missing
+                if found == cells + 1 and line.rstrip().endswith(","):
+                    advice = "a comma too many at its end"
                 message = f"{found} cells where the header has {cells}: {advice}"
                 raise self.refuse(message, self._numbers[row], len(line) + 1)
         self.lines = np.asarray(self._numbers[: len(body)], dtype=np.int64)
@@ -105,8 +107,8 @@ class Table:
                 numbers.append(number)
         if not kept:
             raise self.refuse("only comments: there is no header line", 1)
-        for separator, called in ((";", "semicolons"), ("\t", "tabs")):
-            if separator in kept[0] and "," not in kept[0]:
+        for separator, called in ((";", "semicolons"), ("\t", "tabs"), (" ", "spaces")):
+            if separator in kept[0].strip() and "," not in kept[0]:
                 raise self.refuse(
                     f"columns are separated by {called}: save with commas and decimal points "
                     "(`ninespring import --map` converts)",
@@ -126,7 +128,8 @@ class Table:
         starts = [1 + sum(len(cell) + 1 for cell in cells[:k]) for k in range(len(cells))]
         for k, name in enumerate(names):
             if name == "":
-                raise self.refuse(f"column {k + 1} has no name", self.header_line, starts[k])
+                too_many = ": a comma too many at the end of the line?" if k == len(names) - 1 else ""
+                raise self.refuse(f"column {k + 1} has no name{too_many}", self.header_line, starts[k])
             if name in names[:k]:
                 raise self.refuse(f"column '{name}' is there twice", self.header_line, starts[k])
         return names, starts
@@ -161,6 +164,9 @@ class Table:
         for row, line in enumerate(self._body):
             if [cell.strip() for cell in line.split(",")] == self.names:
                 said = "the header is there again: two logs in one file? Make two files"
+                return self.refuse(said, self._numbers[row], 1)
+            if row == 0 and all(number_in(cell) is None for cell in line.split(",")):
+                said = "a line of words under the names: delete it, or begin it with # (what is in other units, `ninespring import --map` converts)"
                 return self.refuse(said, self._numbers[row], 1)
             for name, cell in zip(self.names, line.split(","), strict=True):
                 value = cell.strip()
