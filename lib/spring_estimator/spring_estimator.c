@@ -27,6 +27,7 @@
 
 #define LOOK_MOST    0.4f
 #define LOOK_TURNS   3
+#define LOOK_HOT_K   50.0f /* austenite reads as hot at the most: 120 degC, a hold is at 70 or more */
 #define LOOK_WARMS_K 3.0f /* beyond the hottest that it may be */
 
 float spring_clamp(float value, float low, float high)
@@ -337,6 +338,11 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     }
     const bool may_be_hot = told || e->doubtful;
     const float austenite = 1.0f - (1.0f - b->slow_ohm / l->austenite_ohm) / l->change;
+    const float hotter = COEFFICIENT_MOST_PER_K * LOOK_HOT_K / fabsf(l->change);
+    if (!told && austenite > 1.0f + unsure + hotter) {
+        b->untested = false; /* no phase reads that: its sensor lies */
+        return;
+    }
     if (may_be_hot ? austenite <= 1.0f - unsure : austenite >= unsure) {
         return;
     }

@@ -23,6 +23,6 @@ uint16_t spring_estimator_mark(const spring_estimator_t *e, const thermal_model_
     crc = ADD_UP_TO(crc, current_a, last_c7);
     crc = ADD_UP_TO(crc, gone_k, run);
     crc = ADD(crc, e->r_phase_odds);
-    return b->heating ? ADD(crc, b->run.heat)
+    return b->heating ? crc16_add_bytes(crc, &b->run.heat, offsetof(spring_heat_t, turns) + 1u)
                       : crc16_add_bytes(crc, &b->run.line, offsetof(spring_line_t, turns));
 }

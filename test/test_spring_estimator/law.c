@@ -228,8 +228,9 @@ TEST(what_keeps_its_phase_is_no_colder_and_tells_of_its_loss)
 /* ---- from power-on ---- */
 
 /* Three turns at 0.8 A or more tell a phase by what was learnt: 12 % and 2.6 sd of a turn's noise,
- * but no more than 40 %. Of springs that may be hot austenite only, of others martensite only: what
- * tells anything else leaves it to wait, and is looked for no longer. The temperature is even over
+ * but no more than 40 %. Of springs that may be hot austenite only (and no more than that reads
+ * 50 K hotter: half of a current, and resets, heated one to 233 degC), of others martensite only:
+ * what tells anything else leaves it to wait, and is looked for no longer. The temperature is even over
  * the phase's width, and a heating goes on from no less. */
 TEST(look_tells_a_phase_and_a_temperature_evenly_over_its_width)
 {
@@ -251,6 +252,10 @@ TEST(look_tells_a_phase_and_a_temperature_evenly_over_its_width)
         {ANY, false, true, 0.86, 0.002, 2.0, 0.2, 9, true, false, A | B, 78.0, 98.0},
         {ANY, false, true, 0.86, 0.002, 2.0, -0.2, 9, true, false, A | B, 78.0, 98.0},
         {ANY, false, false, 0.86, 0.002, 2.0, 0.2, 9, true, false, ANY, 0.0, 0.0},
+        {ANY, false, true, 1.51, 0.002, 2.0, 0.2, 9, true, false, A | B, 78.0, 98.0},
+        {ANY, false, true, 1.53, 0.002, 2.0, 0.2, 9, true, false, ANY, 0.0, 0.0},
+        {ANY, false, true, 6.0, 0.002, 2.0, 0.2, 9, true, false, ANY, 0.0, 0.0},
+        {M, true, false, 1.53, 0.002, 2.0, 0.2, 9, false, false, A, 78.0, 98.0},
         {ANY, false, false, 0.0, 0.021, 2.0, 0.2, 9, true, false, M, 20.0, 88.0},
         {ANY, false, false, 0.0, 0.022, 2.0, 0.2, 9, true, true, ANY, 0.0, 0.0},
         {ANY, false, false, 0.0, 0.002, 2.0, 0.2, 1, true, true, ANY, 0.0, 0.0},

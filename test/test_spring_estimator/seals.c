@@ -128,8 +128,8 @@ TEST(mark_is_of_every_number_that_is_believed)
         PART(last_c7, gone_k, false),
         PART(gone_k, run, true),
         {offsetof(spring_belief_t, unsteady), offsetof(spring_belief_t, unsteady) + 2u, true},
-        {offsetof(spring_belief_t, run), offsetof(spring_belief_t, run) + sizeof(spring_heat_t),
-         true}};
+        {offsetof(spring_belief_t, run),
+         offsetof(spring_belief_t, run) + offsetof(spring_heat_t, turns) + 1u, true}};
     static const part_t holds[] = {{offsetof(spring_belief_t, run),
                                     offsetof(spring_belief_t, run) + offsetof(spring_line_t, turns),
                                     true},

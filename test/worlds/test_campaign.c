@@ -641,7 +641,7 @@ TEST(what_the_swarm_lost_once_is_not_lost)
         int lost, silent; /* springs, at the most */
     } table[] = {{44, {30, 38, 57, 87, -1}, 4, 4},
                  {15, {470, 542, 633, 725, 713}, 0, 0},
-                 {44, {24, 239, -1, -1, -1}, 2, 0}};
+                 {44, {24, 239, -1, -1, -1}, 2, 1}};
     static swarm_case_t drawn;
     static run_result_t result;
     for (size_t n = 0; n < ROWS(table); n++) {
