@@ -70,13 +70,13 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "swarm",
         "Worlds that nobody listed: everything drawn at once",
-        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2917",
+        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2918",
         markdown=True,
     ),
     Section(
         "swarm_knows",
         "The same, driven by whoever knows all that is true",
-        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2917 --knows",
+        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2918 --knows",
         markdown=True,
     ),
     Section(

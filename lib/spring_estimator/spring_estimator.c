@@ -27,8 +27,8 @@
 
 #define LOOK_MOST    0.4f
 #define LOOK_TURNS   3
-#define LOOK_HOT_K   50.0f /* austenite reads as hot at the most: 120 degC, a hold is at 70 or more */
-#define LOOK_WARMS_K 3.0f /* beyond the hottest that it may be */
+#define LOOK_HOT_K   50.0f /* above a hold: 120 degC at the most */
+#define LOOK_WARMS_K 3.0f  /* beyond the hottest that it may be */
 
 float spring_clamp(float value, float low, float high)
 {

@@ -356,6 +356,23 @@ TEST(a_circuit_that_another_one_is_since_the_power_went_tells_no_phase)
     }
 }
 
+/* A sensor shows half of its current as the power goes, again and again: what reads twice its
+ * austenite is none, and waits. Each look heated it once more, to 233 degC. */
+TEST(what_reads_twice_its_austenite_as_power_comes_back_is_not_heated)
+{
+    power_on();
+    want(CENTRE, 1000);
+    TEST_ASSERT_TRUE(run(300.0) < HOTTEST_C);
+    TEST_ASSERT_TRUE(loop_scale_sensor(loop, CENTRE, 0.5, 1.0));
+    for (int cut = 0; cut < 6; cut++) {
+        cut_power(1.0, true);
+        want(CENTRE, 1000);
+        const double hottest_c = run(4.0);
+        here("cut %d: %.1f degC", cut, hottest_c);
+        TEST_ASSERT_TRUE(hottest_c < HOTTEST_C);
+    }
+}
+
 /* Neither sign nor size of the declared change is believed: what is seen is learnt. */
 TEST(change_of_resistance_is_learnt_whatever_is_declared)
 {

@@ -230,8 +230,8 @@ TEST(what_keeps_its_phase_is_no_colder_and_tells_of_its_loss)
 /* Three turns at 0.8 A or more tell a phase by what was learnt: 12 % and 2.6 sd of a turn's noise,
  * but no more than 40 %. Of springs that may be hot austenite only (and no more than that reads
  * 50 K hotter: half of a current, and resets, heated one to 233 degC), of others martensite only:
- * what tells anything else leaves it to wait, and is looked for no longer. The temperature is even over
- * the phase's width, and a heating goes on from no less. */
+ * what tells anything else leaves it to wait, and is looked for no longer. The temperature is even
+ * over the phase's width, and a heating goes on from no less. */
 TEST(look_tells_a_phase_and_a_temperature_evenly_over_its_width)
 {
     static const struct {

@@ -86,24 +86,32 @@ TEST(phase_is_missing_beyond_what_steps_noise_and_coefficient_explain)
     }
 }
 
-/* From austenite start on, but for 2 % of the phase, and the noise of the mean of two turns, which is
- * no more: 0.66 mohm. */
+/* From austenite start on, but for 2 % of the phase, and the noise of the mean of two turns, which
+ * is no more: 0.66 mohm. */
 TEST(heating_is_over_where_its_austenite_is_read_twice)
 {
     static const struct {
         float temperature_c, change, ohm, before_ohm;
         bool over;
     } table[] = {
-        {89.0f, 0.2f, 0.201f, 0.2f, true},      {89.0f, 0.2f, 0.1988f, 0.2f, true},
-        {89.0f, 0.2f, 0.1986f, 0.2f, false},    {89.0f, -0.2f, 0.2012f, 0.2f, true},
+        {89.0f, 0.2f, 0.201f, 0.2f, true},
+        {89.0f, 0.2f, 0.1988f, 0.2f, true},
+        {89.0f, 0.2f, 0.1986f, 0.2f, false},
+        {89.0f, -0.2f, 0.2012f, 0.2f, true},
         {89.0f, -0.2f, 0.2014f, 0.2f, false},
-        {87.0f, 0.2f, 0.201f, 0.2f, false},     {89.0f, 0.2f, 0.201f, 0.0f, false},
-        {89.0f, 0.2f, 0.201f, 0.196f, false},   {89.0f, -0.2f, 0.203f, 0.198f, true},
-        {89.0f, -0.2f, 0.197f, 0.196f, true},   {89.0f, -0.2f, 0.197f, 0.0f, false},
-        {88.0f, 0.2f, 0.201f, 0.2f, true},      {89.0f, 0.2f, 0.2015f, 0.2015f, true},
+        {87.0f, 0.2f, 0.201f, 0.2f, false},
+        {89.0f, 0.2f, 0.201f, 0.0f, false},
+        {89.0f, 0.2f, 0.201f, 0.196f, false},
+        {89.0f, -0.2f, 0.203f, 0.198f, true},
+        {89.0f, -0.2f, 0.197f, 0.196f, true},
+        {89.0f, -0.2f, 0.197f, 0.0f, false},
+        {88.0f, 0.2f, 0.201f, 0.2f, true},
+        {89.0f, 0.2f, 0.2015f, 0.2015f, true},
         {89.0f, 0.2f, 0.2017f, 0.2017f, false}, /* beyond it */
-        {89.0f, -0.2f, 0.196f, 0.196f, true},   {89.0f, -0.2f, 0.1956f, 0.1956f, false},
-        {108.0f, 0.2f, 0.2045f, 0.2045f, true}, {93.0f, 0.2f, 0.2017f, 0.2017f, false},
+        {89.0f, -0.2f, 0.196f, 0.196f, true},
+        {89.0f, -0.2f, 0.1956f, 0.1956f, false},
+        {108.0f, 0.2f, 0.2045f, 0.2045f, true},
+        {93.0f, 0.2f, 0.2017f, 0.2017f, false},
     };
     for (size_t n = 0; n < ROWS(table); n++) {
         row(n);
