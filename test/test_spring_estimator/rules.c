@@ -130,6 +130,18 @@ TEST(heating_is_over_where_its_austenite_is_read_twice)
         TEST_ASSERT_EQUAL(table[n].temperature_c > 98.0f,
                           spring_estimator_has_transformed(&estimator, &model, 0));
     }
+    /* by the mean of a step, if it has eight turns: its noise is less, 0.354 */
+    for (uint8_t turns = 7; turns <= 9; turns++) {
+        begin_heated(89.0f, 0.2f, 0.19f);
+        INSIDE.run.heat.turns = turns;
+        INSIDE.run.heat.sum_ohm = 0.1994f * (float)turns;
+        TEST_ASSERT_EQUAL(turns > 7, spring_estimator_has_transformed(&estimator, &model, 0));
+        INSIDE.run.heat.sum_ohm = 0.1992f * (float)turns;
+        TEST_ASSERT_FALSE(spring_estimator_has_transformed(&estimator, &model, 0));
+        INSIDE.run.heat.sum_ohm = 0.1994f * (float)turns;
+        INSIDE.heating = false;
+        TEST_ASSERT_FALSE(spring_estimator_has_transformed(&estimator, &model, 0));
+    }
     INSIDE.changes = false;
     spring_estimator_begin_heating(&estimator, &model, 0);
     TEST_ASSERT_TRUE(INSIDE.changes); /* nothing is known of that yet */
@@ -471,7 +483,7 @@ TEST(all_that_is_compared_with_jumps_along)
         float *const both[] = {&INSIDE.slow_ohm, &INSIDE.learnt.austenite_ohm,
                                &INSIDE.learnt.martensite_ohm};
         float *const heat[] = {&INSIDE.run.heat.mark_ohm, &INSIDE.run.heat.onset_ohm,
-                               &INSIDE.run.heat.cold_ohm};
+                               &INSIDE.run.heat.cold_ohm, &INSIDE.run.heat.sum_ohm};
         float *const line[] = {&INSIDE.run.line.ohm};
         float *const *const own = heating != 0 ? heat : line;
         const size_t owned = heating != 0 ? ROWS(heat) : ROWS(line);

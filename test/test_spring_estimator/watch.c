@@ -351,6 +351,42 @@ TEST(onset_is_a_change_that_no_coefficient_makes)
     }
 }
 
+/* A slow step compares the mean of its turns with that of the one before: the more turns, the less
+ * heat it needs (a 1600th of the noise, over the root of them; 2 K), and the less is noise. */
+TEST(slow_step_compares_means)
+{
+    static const struct {
+        double noise, turn_k, change;
+        unsigned turns;
+        bool changes;
+    } table[] = {
+        {0.004, 0.5, 6 * 0.5 * MOST_PER_K + 0.0034, 6, true},
+        {0.004, 0.5, 6 * 0.5 * MOST_PER_K + 0.0031, 6, false},
+        {0.001, 0.25, 8 * 0.25 * MOST_PER_K + 0.0008, 8, true},
+        {0.001, 0.25, 8 * 0.25 * MOST_PER_K + 0.0006, 8, false},
+        {0.002, 0.001, 0.001, 255, true},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_heating_at(85.0, B, 10.0);
+        row(n);
+        INSIDE.noise = (float)table[n].noise;
+        const double mean_ohm = 0.2 * (1.0 + table[n].change);
+        for (unsigned turn = 1; turn <= table[n].turns; turn++) {
+            TEST_ASSERT_EQUAL_UINT8(turn - 1u, INSIDE.run.heat.turns);
+            NEAR(0.2, INSIDE.run.heat.mark_ohm);
+            INSIDE.run.heat.heat_k = (float)(10.0 + turn * table[n].turn_k);
+            const bool odd = turn == table[n].turns && turn % 2u == 1u;
+            INSIDE.ohm = (float)(mean_ohm + (odd ? 0.0 : turn % 2u == 1u ? 0.004 : -0.004));
+            spring_heating_watch(&estimator, &INSIDE, &model, 0);
+        }
+        TEST_ASSERT_EQUAL_UINT8(0, INSIDE.run.heat.turns);
+        NEAR(0.0, INSIDE.run.heat.sum_ohm);
+        NEAR(mean_ohm, INSIDE.run.heat.mark_ohm);
+        NEAR(10.0 + table[n].turns * table[n].turn_k, INSIDE.run.heat.mark_k);
+        TEST_ASSERT_EQUAL(table[n].changes, INSIDE.changes);
+    }
+}
+
 /* Where nothing can be compared, nothing is: the mark is begun anew, or stays. */
 TEST(heating_that_cannot_be_compared_is_marked_anew)
 {
