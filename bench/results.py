@@ -82,7 +82,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "board_swarm",
         "The board in everything at once",
-        f"{HOST}/bench/swarm/bench_swarm --runs 430 --seed 7407107 --resume build/results/board_swarm.txt",
+        f"{HOST}/bench/swarm/bench_swarm --runs 100 --seed 7407537 --resume build/results/board_swarm.txt",
     ),
     Section(
         "lies",

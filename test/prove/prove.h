@@ -71,8 +71,7 @@ static inline void any_circuit(current_control_parameters_t *values)
 /* What may be believed of any circuit (circuit_source). */
 static inline circuit_source_t any_source(void)
 {
-    const circuit_source_t source = {.supply_mv = Frama_C_float_interval(840.0f, 17600.0f),
-                                     .drop_mv = Frama_C_float_interval(0.0f, 1150.0f),
+    const circuit_source_t source = {.drop_mv = Frama_C_float_interval(0.0f, 1150.0f),
                                      .step_mv = Frama_C_float_interval(1.0f, 24.0f),
                                      .unsure_mv = Frama_C_float_interval(0.0f, 600.0f),
                                      .less_mv = Frama_C_float_interval(0.0f, 300.0f),
