@@ -82,12 +82,12 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "board_swarm",
         "The board in everything at once",
-        f"{HOST}/bench/swarm/bench_swarm --runs 100 --seed 7407537 --resume build/results/board_swarm.txt",
+        f"{HOST}/bench/swarm/bench_swarm --runs 190 --seed 7407537 --resume build/results/board_swarm.txt",
     ),
     Section(
         "lies",
         "A sensor that begins to lie, or a supply that moves",
-        f"{PYTHON} bench/lies/lies.py --runs 4000 --seed 7104",
+        f"{PYTHON} bench/lies/lies.py --runs 4000 --seed 7105",
     ),
     Section("flips", "Bits that turn over", f"{HOST}/bench/swarm/bench_flips --runs 50 --boards 40 --seed 8001"),
     Section("mutate", "What the tests notice", "script/mutate"),
