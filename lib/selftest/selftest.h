@@ -14,10 +14,9 @@ extern "C" {
 #endif
 
 #define SELFTEST_CURRENT_MA 300u /* or what its limits leave of that */
-#define SELFTEST_LEAST_MA                                                                          \
-    50u                    /* less tells nothing: offsets of the readings are 10 mA and 25 mV      \
-                            */
-#define SELFTEST_TICKS 30u /* 0.6 s: the current has settled, the spring warmed by 0.1 K */
+/* Less tells nothing: offsets of the readings are 10 mA and 25 mV. */
+#define SELFTEST_LEAST_MA 50u
+#define SELFTEST_TICKS    30u /* 0.6 s: the current has settled, the spring warmed by 0.1 K */
 
 typedef struct {
     uint32_t since_tick;

@@ -18,10 +18,10 @@
 #define TRUST_STILL_SDS 0.7f /* where the transformation may never show: probably over */
 #define TRUST_ONSET_SDS 1.3f /* where its beginning was seen: certainly, but for 10 % */
 
-#define READS_MISSING 0.02f /* of the phase: nobody feels it */
-#define READS_TURNS   8     /* at least, of a step's mean */
-#define READS_NOISE   0.354f
-#define TWO_NOISE     0.707f
+#define READS_MISSING 0.02f  /* of the phase: nobody feels it */
+#define READS_TURNS   8      /* at least, of a step's mean */
+#define READS_NOISE   0.354f /* of the mean of so many, 1 / sqrt(8); no less of more */
+#define TWO_NOISE     0.707f /* of two */
 
 #define EXPLAINED_LEAST 0.005f /* of a resistance: what a sensor's steps leave in one turn */
 
