@@ -245,10 +245,10 @@ def mean(values: Iterable[float]) -> float:
 
 
 def heated_at(trace: Columns, spring: int) -> list[float]:
-    """Return when a spring was heated through its transformation, s: from a hold's temperatures to above austenite start."""
+    """Return when a spring was heated, s: from a hold's temperatures to where it transforms, which what lost little does below austenite start."""
     out, below = [], True
     for time_s, one in zip(trace["time_s"], trace[f"t{spring}_c"], strict=True):
-        if below and one > AUSTENITE_START_C + 2.0:
+        if below and one > AUSTENITE_START_C - 2.0:
             out.append(time_s - trace["time_s"][0])
             below = False
         elif one < (MARTENSITE_START_C + AUSTENITE_START_C) / 2.0:

@@ -52,3 +52,9 @@ def test_the_demo_finds_what_nobody_declared_and_drives_better_right_after_its_u
 def test_the_demos_paper_is_the_papers(demo: ModuleType) -> None:
     text = re.sub(r"<[^>]*>", "", demo.paper())
     assert re.search(r"met to\s+0\.\d\d K rms", text) and "missed" in text
+
+
+def test_a_spring_that_is_heated_again_counts_though_it_takes_up_little(demo: ModuleType) -> None:
+    held_c = [20.0, 95.0, 102.0, 90.0, 85.0, 78.0, 84.0, 88.3, 82.0, 80.5, 80.0]
+    trace = {"time_s": [float(time_s) for time_s in range(len(held_c))], "t1_c": held_c}
+    assert demo.heated_at(trace, 1) == [1.0, 7.0]
