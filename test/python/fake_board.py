@@ -87,7 +87,7 @@ class FakeBoard:
             except OSError:
                 return
             if b"!" in buffer:
-                self.seen.append("!")
+                self.seen.append("!!" if b"!!" in buffer else "!")
                 buffer = buffer.replace(b"!", b"")
                 if self._busy:
                     self._busy = False

@@ -107,14 +107,16 @@ class BoardSource(Source):
         self.closing.set()
         self._thread.join(20)
 
-    def stop_now(self) -> str:
+    def stop_now(self, supply: bool = False) -> str:
         """Send the stop that the board obeys from its receive interrupt; whatever was wished before is dropped."""
         self._play = None
         self._drop("dropped by the stop")
         board = self._board
         if board is None:
             raise WorkError("the board is not there")
-        board.stop_now()
+        board.stop_now(supply)
+        if supply:
+            return "STOP was sent, for the supply, too: when the state says so, all springs are off. Clear faults, then Supply on."
         return "STOP was sent: when the state says so, all springs are off. Clear faults to go on."
 
     def settings(self) -> list[dict[str, Any]]:
@@ -434,7 +436,7 @@ class BoardSource(Source):
         except WorkError as error:
             self._end_recording(str(error))
             raise
-        return str(path)
+        return f"recording into {path}"
 
     def _log_row(self, row: Row) -> None:
         if self._sink:
@@ -468,7 +470,6 @@ LINES = {
     "pattern": "pattern {springs}",
     "policy": "policy {policy}",
     "fan": "fan {percent:.0f}",
-    "ambient": "ambient {celsius:.2f}",
     "set": "${name}={value}",
     "cold": "model cold",
     "say": "{line}",

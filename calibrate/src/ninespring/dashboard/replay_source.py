@@ -73,7 +73,7 @@ class ReplaySource(Source):
         self.closing.set()
         self._thread.join(5)
 
-    def stop_now(self) -> str:
+    def stop_now(self, supply: bool = False) -> str:
         """Pause: there is nothing to switch off."""
         self._playing = False
         self._show(self._row)

@@ -224,7 +224,7 @@ async def _carry_out(source: Source, wish: dict[str, Any], rate: _Rate, answers:
     # a wish is taken before anything is awaited: a page's wishes keep their order
     wish = wishes.validated(wish)
     if wish["do"] == "stop":
-        return source.stop_now()
+        return source.stop_now(wish.get("supply", False))
     off = wishes.switches_off(wish)
     if not off and not rate.take():
         raise WorkError(f"too many wishes of this page: {A_SECOND:g} a second, {AT_ONCE:g} at once")

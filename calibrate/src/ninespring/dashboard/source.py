@@ -93,8 +93,8 @@ class Source:
     def start(self) -> None:
         """Begin."""
 
-    def stop_now(self) -> str:
-        """Switch everything off, at once, from any thread; return what was done, in words."""
+    def stop_now(self, supply: bool = False) -> str:
+        """Switch everything off, with `supply` that, too, at once, from any thread; return what was done, in words."""
         raise NotImplementedError
 
     def do(self, wish: dict[str, Any]) -> Future[str]:

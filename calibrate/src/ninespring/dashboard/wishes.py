@@ -43,12 +43,11 @@ WISHES: dict[str, dict[str, Any]] = {
     },
     "policy": {"policy": Annotated[Literal["open", "precompensate"], Meta(description="open or precompensate")]},
     "fan": {"percent": Level},
-    "ambient": {"celsius": _number(-40, 85, "degC")},
     "set": {
         "name": _text("[a-z0-9_]{1,40}", "the name of a setting"),
         "value": _text(r"-?[0-9]{1,9}(\.[0-9]{1,9})?", "a number with a point and without an exponent, as 0.006"),
     },
-    "say": {"line": _text("[!-~][ -~]{0,62}", "one line of at most 63 plain characters")},
+    "say": {"line": _text("[!-~][ -~]{0,63}", "one line of at most 64 plain characters")},
     "seek": {"time_s": _number(-1e9, 1e9, "s")},
     "speed": {"speed": _number(0.1, 1000)},
 }
@@ -93,7 +92,7 @@ def validated(wish: dict[str, Any]) -> dict[str, Any]:
 def _typed(line: str) -> dict[str, Any]:
     """Return what a typed line is: what acts at once on the console does so here, and an off is an off."""
     if "!" in line:
-        return {"do": "stop"}
+        return {"do": "stop", "supply": "!!" in line}
     if "?" in line and line != "?":
         raise InputError("? acts at once, in the middle of a line, too: alone, please")
     if line.split()[0].lower() == "telemetry":

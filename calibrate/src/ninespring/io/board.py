@@ -381,9 +381,9 @@ class Board:
                 return True
         return False
 
-    def stop_now(self) -> None:
-        """Stop at once, from any thread, whatever is under way: `clear` goes on."""
-        self._port.write("!")
+    def stop_now(self, supply: bool = False) -> None:
+        """Stop at once, from any thread, whatever is under way: `clear` goes on. With `supply` that goes off, too: then also `supply on`."""
+        self._port.write("!!" if supply else "!")
 
     def on(self, spring: int | None = None, level: float = 100) -> None:
         """Drive a spring (1 = top left, row by row; None: all) at a level of 0..100 percent."""
@@ -592,7 +592,10 @@ def settings_in(text: str, name: str) -> Settings:
         if not (match := re.fullmatch(r"\$([a-z0-9_]+)=(-?\d+(?:\.\d+)?)", line)):
             hint = f": {DECIMAL_COMMA}" if re.search(r"\d,\d", line) else ""
             raise InputError(f"'{line[:40]}' is not a setting, `$name=value`{hint}", name, number, column)
-        out[match[1]] = match[2]
+        if (before := out.setdefault(match[1], match[2])) != match[2]:
+            raise InputError(
+                f"{match[1]} is {match[2]} here and {before} before: leave one of them", name, number, column
+            )
         out.places[match[1]] = f"{name}:{number}:{column}: "
     if not out:
         raise InputError("no setting in it", name)

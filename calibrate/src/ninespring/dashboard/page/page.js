@@ -503,7 +503,7 @@ $("console").onsubmit = (event) => {
   const line = $("line").value.trim();
   if (!line) return;
   tell(`> ${line}`);
-  quietly({ do: "say", line });
+  ask({ do: "say", line }).then((said) => { if (!said) tell("ok"); }, () => {});
   $("line").value = "";
 };
 // The board's own words; asked for again with each new sight of that spring, and as how long ago they were grows.
