@@ -137,6 +137,8 @@ def test_what_the_board_has_otherwise_than_sent_is_not_taken_back(fake: FakeBoar
         (b"$rows=3\n  $loss_w_per_k=0,006\n", 2, "s.txt:2:3: '$loss_w_per_k=0,006' is not a setting"),
         (b"$rows=3\n$loss_w_per_k=0,006\n", 2, "a decimal comma?"),
         (b"$loss_w_per_k=0.006 0.007\n", 2, "s.txt:1:1: '$loss_w_per_k=0.006 0.007' is not a setting"),
+        (b"$rows=3\n$rows=3\n", 0, "1 settings sent"),
+        (b"$rows=3\n$rows=2\n", 2, "s.txt:2:1: rows is 2 here and 3 before: leave one of them"),
         (b"# nothing\n", 2, "s.txt: no setting in it"),
         (b"loss_w_per_k=1\n", 2, "s.txt:1:1: 'loss_w_per_k=1' is not a setting"),
         (b"$loss=1;$save\n", 2, "is not a setting"),

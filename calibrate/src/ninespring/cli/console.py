@@ -95,6 +95,8 @@ def _same(one: Path, other: Path) -> bool:
 class Real(click.FloatRange):
     """An option's number: finite, and in its range."""
 
+    name = "number"
+
     def __init__(self, within: Range) -> None:
         super().__init__(within.low, within.high, min_open=within.above)
 
@@ -110,6 +112,8 @@ class Real(click.FloatRange):
 
 class Whole(click.IntRange):
     """An option's whole number, in its range."""
+
+    name = "whole number"
 
     def __init__(self, within: Range) -> None:
         super().__init__(int(within.low), int(within.high))

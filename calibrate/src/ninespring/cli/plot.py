@@ -38,7 +38,7 @@ def plot(log: Path, model_path: Path | None, array_path: Path | None, at: float 
     if kind == ".gif" and at is not None:
         raise InputError("--at is one picture: .png, .svg or .pdf", output)
     if kind not in PICTURES:
-        raise InputError(f"'{kind}' is none of {', '.join(PICTURES)}", output)
+        raise InputError(f"a picture's name ends in one of {', '.join(PICTURES)}", output)
     model, array = model_and_array(model_path, array_path)
     run = read_log(log, array.springs if array else None, temperatures=False)
     notes_of([run])

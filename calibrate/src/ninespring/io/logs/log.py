@@ -121,7 +121,8 @@ def _driving_columns(table: Table, springs: int | None, temperatures: bool, why:
             raise table.refuse_header(said, name)
         if number := int(match[2] or match[4] or 0):
             if number > min(springs or MAX_SPRINGS, MAX_SPRINGS):
-                said = f"column '{name}' but the array has {springs or MAX_SPRINGS} springs{because}"
+                has = f"the array has {springs}" if springs else f"a log has at most {MAX_SPRINGS}"
+                said = f"column '{name}' but {has} springs{because}"
                 raise table.refuse_header(said, name)
             groups[match[1] or "u"].add(number)
     if "time_s" not in table.names:

@@ -15,8 +15,10 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
 
 
 def _says(numbers: Numbers, variant: str) -> str:
-    sizes = [f"{sized(*number, factor=100.0)} %" for number in numbers.values()]
-    return f"Resistance rises by {' and '.join(sizes)} per K."
+    sizes = [sized(*number, unit="%", factor=100.0) for number in numbers.values()]
+    if len(sizes) == 1:
+        return f"Resistance rises by {sizes[0]} per K."
+    return f"Per kelvin resistance rises by {sizes[0]} as martensite, by {sizes[1]} as austenite."
 
 
 EFFECT = Effect("resistance_temperature", _candidates, says=_says)
