@@ -310,16 +310,16 @@ def faulty(time_s: float) -> str:
 
 
 def test_a_fault_is_said_as_it_comes_in_the_log_and_at_the_end(tmp_path: Path) -> None:
-    comes = ["FAULT spring 1: fault 2 open_circuit", *(faulty(0.5 * k) for k in range(7, 12))]
+    comes = ["FAULT spring 1: fault 2 open_spring", *(faulty(0.5 * k) for k in range(7, 12))]
     comes += ["<limits|spring:1|t:6.0|safety|cut_a:0.000>", faulty(6.0)]
     board = FakeBoard(stream=[*STREAM[:6], *comes], every_s=0.01)
     done = record(board, tmp_path, "--duration", 5, "--json", tmp_path / "r.json")
     assert done.returncode == 1
-    words = f"at 3.5 s: spring 1: fault 2 open_circuit ({FAULTS[2]})"
+    words = f"at 3.5 s: spring 1: fault 2 open_spring ({FAULTS[2]})"
     assert done.stderr.splitlines()[0] == f"fault {words}"
     assert done.stderr.splitlines()[-1].startswith(f"ninespring: a fault cut this run short, {words}; what came is in")
     result = json.loads((tmp_path / "r.json").read_text())
-    assert result["faults"] == [{"time_s": 3.5, "spring": 1, "number": 2, "name": "open_circuit"}]
+    assert result["faults"] == [{"time_s": 3.5, "spring": 1, "number": 2, "name": "open_spring"}]
     assert words in result["ended"]
     lines = (tmp_path / "log.csv").read_text().splitlines()
     assert f"# fault {words}" in lines and f"# ended: {result['ended']}" in lines
