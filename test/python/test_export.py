@@ -323,3 +323,19 @@ def test_a_declared_number_of_an_effect_is_none_that_was_found(tmp_path: Path) -
 def test_what_is_not_written_never_names_a_spring_that_is() -> None:
     kept = dict.fromkeys(("wire_1", "wire_3", "loss_1", "loss_2", "area_mm2"), "unknown")
     assert together(kept, {"wire_2": "1"}) == {"unknown": ["wire_1", "wire_3", "loss", "area_mm2"]}
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("$nonsense=1", "now.txt:2:1: the chip has no setting 'nonsense'"),
+        ("$loss_w_per_k=99", "now.txt:2:1: loss_w_per_k is 99; it must be 1e-06 to 0.065535 W/K"),
+        ("$loss_scale_3=9", "now.txt:2:1: loss_scale_3 is 9; it must be 0.001 to 8"),
+    ],
+)
+def test_what_no_board_can_have_is_refused_where_it_stands(tmp_path: Path, line: str, said: str) -> None:
+    (tmp_path / "model.toml").write_text(model_text(Model(Array())))
+    (tmp_path / "now.txt").write_text(f"$rows=3\n{line}\n")
+    words = ("--model", tmp_path / "model.toml", "--chip", tmp_path / "now.txt", "-o", tmp_path / "s.txt")
+    code, why = ended("export", *words)
+    assert code == 2 and said in why and not (tmp_path / "s.txt").exists()

@@ -13,6 +13,7 @@ from ..infer.predict import chip_errors, refuse_seen
 from ..io import results
 from ..io.board import Board, as_lines, read_settings
 from ..io.logs import check_folder, read_bytes
+from ..model import tables
 from ..model.models import Model, model_of_layer, read_model
 from ..model.stiffness import LAYERS
 from ..say.page import with_verification
@@ -53,7 +54,17 @@ def _model(path: Path, layer: str | None) -> Model:
 
 
 def _chip_lines(path: Path | None) -> str:
-    return as_lines(read_settings(path)) if path else ""
+    if not path:
+        return ""
+    has = read_settings(path)
+    for name, value in has.items():
+        one = tables.setting(name)
+        if one is None:
+            raise InputError(f"{has.places[name]}the chip has no setting '{name}'")
+        if not one.minimum <= float(value) <= one.maximum:
+            within = f"{one.minimum:g} to {one.maximum:g} {one.unit}".strip()
+            raise InputError(f"{has.places[name]}{name} is {value}; it must be {within}")
+    return as_lines(has)
 
 
 @command("""\b

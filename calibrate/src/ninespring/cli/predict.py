@@ -116,7 +116,9 @@ def replay(log: Path, model_path: Path, output: Path, json_path: Path | None) ->
     )
     keys = {"tool": f"ninespring {__version__} replay", "model": model_path.name}
     write({output: log_text(run.time_s, columns, keys), json_path: results.checked(result)})
-    table = Table("spring", "samples", "rms, K", "mean", "largest", *(["seen by the sensors, rms"] * through_sensors))
+    table = Table(
+        "spring", "samples", "rms, K", "mean, K", "largest, K", *(["seen by the sensors, rms, K"] * through_sensors)
+    )
     for one in springs:
         numbers = [one.rmse_c, one.mean_error_c, one.largest_error_c, one.shown_rmse_c]
         cells = ["-" if value is None else f"{value:.3f}" for value in numbers[: 3 + through_sensors]]

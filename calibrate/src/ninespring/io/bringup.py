@@ -254,7 +254,7 @@ def step_board(board: Board, step: Step, hands: Hands | None) -> None:
     step.numbers += [
         (("firmware", "start", "load")[k] if k < 3 else "", one, "") for k, one in enumerate(board.version)
     ]
-    step.tell("fuses", "cannot be read over USB: a programmer reads them", "docs/flashing.md")
+    step.tell("fuses", "cannot be read over USB: a programmer reads them", "as docs/flashing.md has them")
     if "mega2560" not in board.version[0]:
         step.found.append(f"this is no Mega 2560: {board.version[0]}")
 
