@@ -55,40 +55,40 @@ TEST(a_welded_switch_heats_until_the_supply_is_off)
         off_after_ms(mega, what, LIMIT_MS);
         TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_STUCK_ON, mega.view().board_fault);
         TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_STUCK_ON, mega.view().spring[4].fault);
-        const std::string faults = mega.say("faults");
-        expect_in(faults, "board: fault 11 stuck_on: cut the supply\r\n");
-        expect_in(faults, "spring 5: fault 11 stuck_on");
-        expect_in(faults, "supply: off\r\n");
-        mega.expect_error("supply on", 11);
-
-        mega.expect_ok("clear"); /* and nothing comes back by that */
-        mega.run_ms(200.0);
-        TEST_ASSERT_FALSE(board_is_fed(mega.raw()));
-        mega.expect_error("on 1", 18);
-
-        mega.expect_ok("supply on"); /* still closed: found and cut again */
-        mega.run_ms(60.0);
-        TEST_ASSERT_TRUE(board_is_fed(mega.raw()));
-        off_after_ms(mega, "the supply on again", LIMIT_MS);
-
-        board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, false);
-        mega.expect_ok("clear"); /* the second time it has to rest */
-        mega.expect_error("supply on", 11);
-        mega.expect_says("faults", "fault 11 stuck_on: cut the supply: clear ");
-        mega.run_ms(55e3);
-        mega.expect_ok("clear");
-        mega.expect_ok("supply on");
-        mega.run_ms(100.0);
-        TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), "the supply started a spring");
-        mega.expect_ok("on 1");
-        mega.run_ms(300.0);
-        TEST_ASSERT_TRUE(board_current_a(mega.raw(), 0) > 0.1);
-        TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, mega.view().spring[0].fault);
     };
     try_from_here([&] { closes("switch of a driven spring closed"); });
     mega.expect_ok("off 5");
     mega.run_ms(200.0);
     closes("switch of a spring that is off closed");
+    const std::string faults = mega.say("faults");
+    expect_in(faults, "board: fault 11 stuck_on: cut the supply\r\n");
+    expect_in(faults, "spring 5: fault 11 stuck_on");
+    expect_in(faults, "supply: off\r\n");
+    mega.expect_error("supply on", 11);
+
+    mega.expect_ok("clear"); /* and nothing comes back by that */
+    mega.run_ms(200.0);
+    TEST_ASSERT_FALSE(board_is_fed(mega.raw()));
+    mega.expect_error("on 1", 18);
+
+    mega.expect_ok("supply on"); /* still closed: found and cut again */
+    mega.run_ms(60.0);
+    TEST_ASSERT_TRUE(board_is_fed(mega.raw()));
+    off_after_ms(mega, "the supply on again", LIMIT_MS);
+
+    board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, false);
+    mega.expect_ok("clear"); /* the second time it has to rest */
+    mega.expect_error("supply on", 11);
+    mega.expect_says("faults", "fault 11 stuck_on: cut the supply: clear ");
+    mega.run_ms(55e3);
+    mega.expect_ok("clear");
+    mega.expect_ok("supply on");
+    mega.run_ms(100.0);
+    TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), "the supply started a spring");
+    mega.expect_ok("on 1");
+    mega.run_ms(300.0);
+    TEST_ASSERT_TRUE(board_current_a(mega.raw(), 0) > 0.1);
+    TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, mega.view().spring[0].fault);
 }
 
 /* A line that takes longer than a tick costs pulses: not so many that the relay opens and the

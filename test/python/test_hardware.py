@@ -6,6 +6,7 @@ import dataclasses
 import re
 import shutil
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -21,9 +22,15 @@ circuit = pytest.importorskip("circuit", reason="SKIPPED: SKiDL is not installed
 needs_ngspice = pytest.mark.skipif(shutil.which("ngspice") is None, reason="SKIPPED: no ngspice on the PATH")
 
 
+def built() -> circuit.Board:
+    """Return a board, built in a thread: SKiDL reads the source of all callers for each part, and a test has a hundred of them."""
+    with ThreadPoolExecutor(1) as thread:
+        return thread.submit(circuit.Board).result()
+
+
 @pytest.fixture(scope="module")
 def board() -> circuit.Board:
-    return circuit.Board()
+    return built()
 
 
 def test_no_electrical_rule_is_broken(board) -> None:
@@ -53,7 +60,7 @@ def test_every_part_of_the_list_is_used_and_has_a_second_source(board) -> None:
     ],
 )
 def test_a_broken_board_is_found(break_it, said) -> None:
-    broken = circuit.Board()
+    broken = built()
     break_it(broken)
     assert any(said in line for line in broken.rules())
 
