@@ -204,7 +204,7 @@ static void drive(drive_policy_kind_t policy)
     start(policy, 82 * 128);
     run(20);
     all(1000);
-    run(policy == DRIVE_POLICY_OPEN ? 400 : 1000); /* heated at once, or in turn; transformed, held */
+    run(policy == DRIVE_POLICY_OPEN ? 400 : 1000); /* at once, or in turn: transformed, held */
     for (uint8_t k = 0; k < SPRINGS; k++) {
         (void)controller_set_target(&controller, k, (uint16_t)(k * 125u));
     }
