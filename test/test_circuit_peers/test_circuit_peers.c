@@ -281,22 +281,6 @@ TEST(what_comes_through_an_unknown_drop_is_no_share)
     TEST_ASSERT_EQUAL_UINT8(8, peers.spring[SPRINGS - 1u].learnt);
 }
 
-/* Shares of before another belief would be held against those after it. */
-TEST(another_belief_begins_anew_and_keeps_what_is_each_ones_own)
-{
-    TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 1.1f, 1.0f));
-    const uint16_t own_q12 = peers.spring[0].own_q12;
-    for (unsigned n = 0; n < 4; n++) {
-        circuit_peers_renew(&peers, SPRINGS, &source, &source);
-        TEST_ASSERT_FALSE(takes(0, HEATS_MV, 0.6f)); /* alone, and nothing is known of before */
-    }
-    TEST_ASSERT_EQUAL_UINT16(own_q12, peers.spring[0].own_q12);
-    TEST_ASSERT_EQUAL_HEX(1, rounds(4, SPRINGS, HEATS_MV, 0.6f, 1.0f));
-    circuit_peers_renew(&peers, SPRINGS - 1u, &source, &source); /* so many, and no more */
-    TEST_ASSERT_EQUAL_UINT(0, peers.spring[SPRINGS - 2u].share_q7);
-    TEST_ASSERT_EQUAL_UINT(128, peers.spring[SPRINGS - 1u].share_q7);
-}
-
 /* At each limit: a share that passes and one that is found in the third window. So many are driven;
  * the first one learnt `was` at learnt_mv, 0 mV: nothing yet; the others show `others` all along.
  * Of a drop, 200 mV that it may be more or less than believed make 130 mV between 1140 and 400, a
