@@ -166,7 +166,7 @@ private:
             ++v_.answers;
             const std::string asked = *pending_;
             pending_.reset();
-            answered(asked, line);
+            answered(lower(asked), line);
             answer_.clear();
         } else {
             answer_.push_back(line);
@@ -200,7 +200,7 @@ private:
         if (next == "selftest") {
             tested_s_ = now_s();
         }
-        if (next == "$save") {
+        if (lower(next) == "$save") {
             saving_ = settings_;
         }
         if (starts(next, "$") && next.find('=') != std::string::npos) {

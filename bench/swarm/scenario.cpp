@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <istream>
+#include <iterator>
 #include <ostream>
 #include <sstream>
 #include <stdexcept>
@@ -344,6 +345,85 @@ void another(scenario &s)
     last(d, s, one);
 }
 
+/* What nobody had drawn before, of dice of its own: words of every other kind, lines faster than
+ * they are answered, a frame for a board that is in no loop. */
+void odd_words(dice &d, scenario &s)
+{
+    static const char *const words[] = {"why 5",
+                                        "why all",
+                                        "learnt",
+                                        "$supply_v",
+                                        "$temperature_limit_c",
+                                        "echo on",
+                                        "echo off",
+                                        "ON 4",
+                                        "Off ALL",
+                                        "on 5 40%",
+                                        "telemetry inputs",
+                                        "model cold",
+                                        "fan 70%",
+                                        "unlock",
+                                        "$SAVE",
+                                        "policy closed",
+                                        "$sensor_averaging=16",
+                                        "ambient warm",
+                                        "off 3 50",
+                                        "supply",
+                                        "telemetry csv",
+                                        "$nonsense",
+                                        "$hold_margin_k=300",
+                                        "selftest",
+                                        "$ambient_source=1"};
+    for (unsigned n = 1 + d.below(8); n > 0; --n) {
+        const double at_s = d.uniform(1.0, s.duration_s), what = d.uniform(0.0, 1.0);
+        if (what < 0.1) {
+            std::string room = "ambient " + std::to_string(s.ambient_c + d.uniform(-3.0, 3.0));
+            s.events.push_back({at_s, kind::say, 0, true, 0.0, room.substr(0, 13)});
+        } else if (what < 0.2) { /* "model\n", again and again */
+            std::string flood;
+            for (unsigned times = 2 + d.below(40); times > 0; --times) {
+                flood += "6d6f64656c0a";
+            }
+            s.events.push_back({at_s, kind::bytes, 0, true, 0.0, flood});
+        } else if (what < 0.3) { /* '~', digits, a line's end */
+            std::string frame = "7e";
+            for (unsigned digits = d.below(120); digits > 0; --digits) {
+                frame += std::to_string(30 + d.below(10));
+            }
+            s.events.push_back({at_s, kind::bytes, 0, true, 0.0, frame + "0a"});
+        } else {
+            s.events.push_back({at_s, kind::say, 0, true, 0.0, words[d.below(std::size(words))]});
+        }
+    }
+}
+
+/* Two to four faults more, that begin within one second. */
+void worst_second(dice &d, scenario &s)
+{
+    const double second_s = d.uniform(2.0, s.duration_s - 1.0);
+    for (unsigned n = 2 + d.below(3); n > 0; --n) {
+        const std::size_t first = s.events.size();
+        fault(d, s);
+        const double at_s = second_s + d.uniform(0.0, 1.0);
+        const auto began =
+            std::find_if(s.events.begin() + static_cast<std::ptrdiff_t>(first), s.events.end(),
+                         [](const event &e) { return e.what != kind::say; });
+        const double moved_s = at_s - began->at_s;
+        std::for_each(began, s.events.end(), [moved_s](event &e) { e.at_s += moved_s; });
+    }
+}
+
+void hostile(scenario &s)
+{
+    dice d(s.seed, 33);
+    if (d.chance(0.5)) {
+        odd_words(d, s);
+    }
+    if (d.chance(0.3)) {
+        worst_second(d, s);
+    }
+}
+
 /* Of half of the boards; of these, half say what it drops, within 0.05 V. */
 void diode(scenario &s)
 {
@@ -389,6 +469,7 @@ scenario draw(std::uint64_t seed)
         fault(d, s);
     }
     another(s);
+    hostile(s);
     diode(s);
     std::stable_sort(s.events.begin(), s.events.end(),
                      [](const event &a, const event &b) { return a.at_s < b.at_s; });
