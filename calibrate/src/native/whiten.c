@@ -20,9 +20,9 @@ typedef struct {
 EXPORT double whiten(size_t rows, size_t errors, const double *step_s, const unsigned char *there,
                      const double *variance, const double *time_constant_s, size_t columns,
                      double *states, double *fields);
-EXPORT double weigh(size_t rows, const double *keep, const double *fade, const unsigned char *there,
-                    const double *variance, size_t columns, double *states, const double *fields,
-                    double *out);
+EXPORT double weigh(size_t rows, const double *step_s, const unsigned char *there,
+                    const double *variance, const double *time_constant_s, size_t columns,
+                    double *states, const double *fields, double *out);
 
 /* The covariance of the errors before a row is read, from that after the row before. */
 static void go_on(const errors_t *errors, const double *keep,
@@ -150,15 +150,14 @@ static void known_goes_on(known_t *known, const double *variance, const double *
 /* What fields (rows * columns) weigh with two errors that last: out[0] is the sum of the squares of
  * what `whiten` would make of them, out[1] the sum of its logarithms, of one column; after each its
  * slopes, by the logarithms of both variances and of both time constants: out[2..5], out[6..9].
- * keep, fade (rows * 2): the part of each error that is left of it from the row before, and that
- * times the step over the time constant, its slope. states: room for 10 * columns. Nothing else is
- * written. Returns out[1]. */
-double weigh(size_t rows, const double *keep, const double *fade, const unsigned char *there,
-             const double *variance, size_t columns, double *states, const double *fields,
+ * step_s[row] leads to a row from the one before; over one in which all is forgotten another log
+ * may begin. states: room for 10 * columns. Nothing else is written. Returns out[1]. */
+double weigh(size_t rows, const double *step_s, const unsigned char *there, const double *variance,
+             const double *time_constant_s, size_t columns, double *states, const double *fields,
              double *out)
 {
-    static const double nothing[2] = {0.0, 0.0};
-    known_t known = {.aa = 0.0}; /* at the first row all is forgotten */
+    known_t known = {.aa = 0.0};                 /* at the first row all is forgotten */
+    double k[2] = {0.0, 0.0}, f[2] = {0.0, 0.0}; /* what is left of each, and its slope */
     double *quick = states, *slow = quick + columns, *d_quick = slow + columns;
     double *d_slow = d_quick + SLOPES * columns;
     double product = 1.0;
@@ -169,7 +168,11 @@ double weigh(size_t rows, const double *keep, const double *fade, const unsigned
         out[k] = 0.0;
     }
     for (size_t row = 0; row < rows; row++) {
-        const double *k = row ? keep + 2 * row : nothing, *f = row ? fade + 2 * row : nothing;
+        for (size_t e = 0; row > 0 && step_s[row] != step_s[row - 1] && e < 2; e++) {
+            const double pace = step_s[row] / time_constant_s[e];
+            k[e] = exp(-pace);
+            f[e] = pace * k[e];
+        }
         known_goes_on(&known, variance, k, f);
         double gain_a = 0.0, gain_b = 0.0, inverse = 0.0;
         double d_gain_a[SLOPES] = {0.0}, d_gain_b[SLOPES] = {0.0}, d_spread[SLOPES] = {0.0};

@@ -135,41 +135,54 @@ class Rows:
         return [np.ascontiguousarray(part[:, :1]), np.ascontiguousarray(part[:, 1:])]
 
 
+@dataclass
+class _Walk:
+    """Fields of so many columns, one behind another: over a step from each to the next all is forgotten."""
+
+    step_s: np.ndarray
+    there: bytes
+    field: np.ndarray
+    """(rows, columns)."""
+
+    def __post_init__(self) -> None:
+        rows, columns = self.field.shape
+        self.states, self.out = np.empty(10 * columns), np.empty(10)
+        step, field, states, out = (native.doubles(one) for one in (self.step_s, self.field, self.states, self.out))
+        self._before, self._after = (rows, step, self.there), (columns, states, field, out)
+
+    def weighed(self, variance: object, time_s: object) -> np.ndarray:
+        """Return squares and logarithms, and the slopes of both: (10,), as whiten.c has them."""
+        native.library().weigh(*self._before, variance, time_s, *self._after)
+        self.out[[1, 6, 7, 8, 9]] *= self.field.shape[1]
+        return self.out
+
+
 class Weighed:
-    """What a model leaves, as its likelihood weighs it: the runs' fields (rows, columns), of means and of what is not."""
+    """What a model leaves, as its likelihood weighs it: the runs' fields (rows, columns), of what is not their mean and of means."""
 
     def __init__(self, rows: Sequence[Rows], vectors: Sequence[np.ndarray]) -> None:
-        self.steps = [one.step_s for one in rows]
         self.count = sum(one.count for one in rows)
         self.together = any(one.turn is not None for one in rows)
-        self.parts: tuple[list[tuple[int, bytes, np.ndarray]], ...] = ([], [])
-        for r, (one, vector) in enumerate(zip(rows, vectors, strict=True)):
+        pieces: tuple[dict[int, list[tuple[np.ndarray, bytes, np.ndarray]]], ...] = ({}, {})
+        for one, vector in zip(rows, vectors, strict=True):
             mean, own = one.turned(vector)
-            if one.turn is not None:
-                self.parts[1].append((r, one.there[0], mean))
-                self.parts[0].append((r, one.there[0], own))
-            else:
-                self.parts[0].extend((r, its, np.ascontiguousarray(own[:, [k]])) for k, its in enumerate(one.there))
-        widest = max((field.shape[1] for part in self.parts for *_, field in part), default=1)
-        self.states = np.empty(10 * widest)
+            each = [(0, one.there[0], own), (1, one.there[0], mean)]
+            if one.turn is None:
+                each = [(0, there, own[:, [k]]) for k, there in enumerate(one.there)]
+            for which, there, field in each:
+                pieces[which].setdefault(field.shape[1], []).append((one.step_s, there, field))
+        self.walks = [
+            [
+                _Walk(np.concatenate(step), b"".join(there), np.concatenate(field))
+                for step, there, field in (zip(*part, strict=True) for part in kind.values())
+            ]
+            for kind in pieces
+        ]
 
-    def keeps(self, time_s: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return the parts that are left of both errors from row to row, and their slopes."""
-        pace = [step[:, None] / time_s for step in self.steps]
-        return [(keep := np.exp(-one), keep * one) for one in pace]
-
-    def of(self, which: int, variance: np.ndarray, keeps: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-        """Return squares and logarithms of one kind of fields, and the slopes of both: (10,), as whiten.c has them."""
-        total, out = np.zeros(10), np.empty(10)
-        states, size, told = (native.doubles(one) for one in (self.states, variance, out))
-        weigh = native.library().weigh
-        for r, there, field in self.parts[which]:
-            keep, fade = map(native.doubles, keeps[r])
-            rows, columns = field.shape
-            weigh(rows, keep, fade, there, size, columns, states, native.doubles(field), told)
-            out[[1, 6, 7, 8, 9]] *= columns
-            total += out
-        return total
+    def of(self, which: int, variance: np.ndarray, time_s: np.ndarray) -> np.ndarray:
+        """Return squares and logarithms of one kind of fields, and the slopes of both: (10,)."""
+        size, lasts = native.doubles(variance), native.doubles(time_s)
+        return sum((walk.weighed(size, lasts) for walk in self.walks[which]), np.zeros(10))
 
     def loss(self, squares: float, logarithms: float) -> float:
         """Return the negative logarithm of the likelihood, white noise as large as fits, but for a constant."""
@@ -179,8 +192,7 @@ class Weighed:
         """Return the loss at logarithms of variances (own quick, slow, mean's quick, slow) and time constants, its slopes,
         and the squares."""
         size = np.exp(z)
-        keeps = self.keeps(size[4:])
-        own, mean = self.of(0, size[:2].copy(), keeps), self.of(1, size[2:4].copy(), keeps)
+        own, mean = self.of(0, size[:2], size[4:]), self.of(1, size[2:4], size[4:])
         both = own + mean
         slope = np.concatenate(
             [0.5 * self.count / max(both[0], 1e-300) * one[2:6] + one[6:] for one in (own, mean, both)]
@@ -190,17 +202,17 @@ class Weighed:
     def begins(self) -> list[np.ndarray]:
         """Return the likeliest of some simple errors with each quick time constant: as large as what is left."""
         sizes = []
-        for part in self.parts:
-            readings = sum(there.count(1) * field.shape[1] for _, there, field in part)
-            squares = sum(float(np.vdot(field, field)) for *_, field in part)
+        for walks in self.walks:
+            readings = sum(one.there.count(1) * one.field.shape[1] for one in walks)
+            squares = sum(float(np.vdot(one.field, one.field)) for one in walks)
             sizes.append(max(0.1, squares / max(1, readings) - 1.0))
         out = []
         for quick_s in BEGIN_S[0]:
             tried = []
             for slow_s in BEGIN_S[1]:
-                keeps = self.keeps(np.array([quick_s, slow_s]))
+                time_s = np.array([quick_s, slow_s])
                 split = [[np.array([(1.0 - slow) * size, slow * size]) for slow in BEGIN_SLOW] for size in sizes]
-                each = [[(one, self.of(which, one, keeps)) for one in split[which]] for which in (0, 1)]
+                each = [[(one, self.of(which, one, time_s)) for one in split[which]] for which in (0, 1)]
                 for (own, a), (mean, b) in itertools.product(*each):
                     z = np.log([*own, *mean, quick_s, slow_s])
                     tried.append((self.loss(a[0] + b[0], a[1] + b[1]), tuple(z)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import itertools
 from dataclasses import replace
 
@@ -57,24 +58,23 @@ def _where_nothing_happens(run: Run, max_rows: int) -> np.ndarray:
         return _evenly(run, -(-len(run.time_s) // max_rows))
     base = 1
     while True:
-        for share in SHARES:
-            rows = _begins(run, events, base, float(share))
-            if len(rows) <= max_rows:
-                return rows
+        # the larger the share, the shorter the log
+        first = bisect.bisect_left(SHARES, -max_rows, key=lambda share: -len(_begins(run, events, base, share)))
+        if first < len(SHARES):
+            return _begins(run, events, base, float(SHARES[first]))
         base *= 2
 
 
 def _begins(run: Run, events: np.ndarray, base: int, share: float) -> np.ndarray:
     """Return where rows begin that are `base` long at an event and grow by a share of the time since."""
     out = []
-    n = len(run.time_s)
-    for begin, end in zip(events, [*events[1:], n], strict=True):
-        at = int(begin)
+    time_s = run.time_s.tolist()
+    for begin, end in itertools.pairwise([*events.tolist(), len(time_s)]):
+        at = begin
         while at < end:
             out.append(at)
-            since = run.time_s[at] - run.time_s[begin]
-            long = min(LONGEST_S, share * since)
-            at = max(at + base, int(np.searchsorted(run.time_s, run.time_s[at] + long)))
+            long = min(LONGEST_S, share * (time_s[at] - time_s[begin]))
+            at = max(at + base, bisect.bisect_left(time_s, time_s[at] + long))
     return np.array(out)
 
 
