@@ -25,6 +25,7 @@ from ..io import results, statistics
 from ..io.logs import condense
 from ..io.logs.run import Run
 from ..model import effects
+from ..model.effects.sensor_gain import GAIN, OR_ITS_SPRING, or_its_spring
 from ..model.models import Array, Model
 from ..model.spec import RUN_AMBIENT, RUNS_OWN, Spec
 from . import (
@@ -790,6 +791,9 @@ def _listed(
         if _at_an_end(final, effect) or (case.instead is not None and effect not in case.instead.spec.effects):
             probability = min(probability, PROBABLE)
         parameters, variant = parameters_of(problem, final, effect), variant_of(final, effect)
+        text = effects.sentence(effect, parameters, variant)
+        if effect == GAIN and or_its_spring(variant, final.spec.effects, {run.mode for run in problem.runs}):
+            probability, text = min(probability, PROBABLE), f"{text} {OR_ITS_SPRING}"
         listed.append(
             results.Effect(
                 name=effect,
@@ -802,7 +806,7 @@ def _listed(
                 witness=sure,
                 on_chip=effect in effects.ON_CHIP,
                 in_words=effects.in_words(effect, variant),
-                text=effects.sentence(effect, parameters, variant),
+                text=text,
                 variant=variant or results.UNSET,
             )
         )

@@ -1,11 +1,26 @@
 """The thermometers, or one of them, read in a wrong proportion or with an offset."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from ..spec import Free
 from .effect import Candidate, Effect, Numbers, Scene, Steady, linear, percent, sized
 
 GAIN, OFFSET = "sensor_gain", "sensor_offset_k"
+BEHIND = "holder_mass", "plate_conduction"
+"""What keeps heat behind springs, behind all of them alike."""
+OR_ITS_SPRING = (
+    "Or: what its spring is mounted on, or its drive, is unlike the others'. These readings do not tell which. "
+    "Exchange two thermometers and record again: what goes along is the thermometer's."
+)
+
+
+def or_its_spring(variant: str, effects: Iterable[str], modes: Iterable[str]) -> bool:
+    """Return whether the gain of one thermometer, in a model with these effects, may be its spring's.
+
+    Of commands each drive's strength is fitted and takes up a gain but for what neighbours are given, and heat behind springs that are
+    mounted unlike is in no model: a gain is where either goes.
+    """
+    return variant.startswith("sensor ") and (set(modes) == {"command"} or not set(BEHIND).isdisjoint(effects))
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
