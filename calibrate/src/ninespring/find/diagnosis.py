@@ -26,6 +26,7 @@ from ..io.logs import condense
 from ..io.logs.run import Run
 from ..model import effects
 from ..model.effects.sensor_gain import GAIN, OR_ITS_SPRING, or_its_spring
+from ..model.effects.spring_mismatch import EACH
 from ..model.models import Array, Model
 from ..model.spec import RUN_AMBIENT, RUNS_OWN, Spec
 from . import (
@@ -47,7 +48,7 @@ from .certainty import CERTAIN, NAMED, PROBABLE, Witness, witness
 from .evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
 from .residual import depends_on
 
-MOST_ROWS, MOST_READINGS = 6_000, 27_000
+MOST_ROWS, MOST_READINGS = 3_000, 27_000
 """Of all logs that are fitted; of all their springs: a diagnosis keeps the slopes of some fifty fits, 1 GB of them."""
 MOST_OF_IT = 0.5
 """Part of what is beyond the noise without an effect that it explains, where more is explained than left."""
@@ -462,9 +463,15 @@ def _accounts(case: _Case) -> list[Fit]:
         likely.setdefault(case.search.key(fit.spec), fit)
     colour = problem.colour
     problem.take_for(None)
-    out = [problem.fit(one.spec, one.as_dict(), tolerance=1e-4) for one in list(likely.values())[:ACCOUNTS]]
+    best = list(likely.values())[:ACCOUNTS]
+    out = [problem.fit(one.spec, one.as_dict(), tolerance=1e-4, near=_plain(one)) for one in best]
     problem.take_for(colour)
     return out
+
+
+def _plain(fit: Fit) -> Fit | None:
+    """Return a fit that was made by least squares of readings as they are, None where it was not."""
+    return fit if fit.weighed is None else None
 
 
 def _rested(plain: _Case, prepared: Callable[[], Problem]) -> _Account | None:
@@ -710,9 +717,14 @@ def _by_least_squares(case: _Case, found: Fit) -> search.Search:
     """
     problem = case.problem
     problem.take_for(None)
-    case.search = search.Search(problem, case.search.candidates, case.declared, case.search.progress)
-    fits = [found, *(fit for _, fit in case.contenders)]
-    final, *others = [problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3) for fit in fits]
+    known = {key: fit for key, fit in case.fits.items() if _plain(fit) and EACH not in dict(key).values()}
+    case.search = search.Search(problem, case.search.candidates, case.declared, case.search.progress, known)
+
+    def again(fit: Fit) -> Fit:
+        same = known.get(case.search.key(fit.spec))
+        return same or problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3, near=_plain(fit))
+
+    final, *others = [again(fit) for fit in (found, *(fit for _, fit in case.contenders))]
     case.contenders = [(effect, fit) for (effect, _), fit in zip(case.contenders, others, strict=True)]
     case.final = _finish(problem, final)
     case.without = {effect: case.search.reduced(case.final, effect) for effect in case.adopted}
@@ -750,7 +762,7 @@ def _the_given(case: _Case, judged_by: unseen.Unseen) -> tuple[Fit, results.Afte
     if problem.colour is not None:
         slopes = problem.plain_slopes(case.final)
         problem.take_for(None)
-        case.final = replace(case.final, jacobian=slopes)
+        case.final = replace(case.final, jacobian=slopes, weighed=None)
     if case.instead is None:
         return case.carried or case.final, after
     again = search.Search(problem, case.search.candidates, case.declared)

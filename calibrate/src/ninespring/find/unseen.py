@@ -8,7 +8,7 @@ known no better counts in what is told, not in what models are judged by.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -64,6 +64,8 @@ class Split:
     left_out: Run
     counts: np.ndarray
     """(rows, springs): where the left-out run's error counts."""
+    fitted: np.ndarray
+    """(readings of all runs,): those that are fitted."""
     alone: bool = False
 
 
@@ -76,7 +78,8 @@ def splits(problem: Problem) -> list[Split]:
     for r in range(max(0, len(runs) - MOST), len(runs)):
         kept = [k for k in range(len(runs)) if k != r]
         part = _problem(problem, [runs[k] for k in kept], kept)
-        out.append(Split(part, tuple(kept), runs[r], problem.mask[r]))
+        fitted = problem.of_samples([np.full((1, 1), k != r) for k in range(len(runs))])
+        out.append(Split(part, tuple(kept), runs[r], problem.mask[r], fitted))
     return out
 
 
@@ -88,7 +91,7 @@ def _ahead(problem: Problem, seen: float) -> Split | None:
     if not np.isfinite(shown).any() or not (problem.mask[0] & late[:, None]).any():
         return None
     part = _problem(problem, [replace(run, temperature_c=shown)], [0])
-    return Split(part, (0,), run, problem.mask[0] & late[:, None], alone=True)
+    return Split(part, (0,), run, problem.mask[0] & late[:, None], problem.of_samples([~late[:, None]]), alone=True)
 
 
 def _problem(whole: Problem, runs: Sequence[Run], kept: Sequence[int]) -> Problem:
@@ -110,6 +113,15 @@ def _of_these(fit: Fit, kept: Sequence[int]) -> tuple[Spec, dict[str, float]]:
     mine = [(f, float(v)) for f, v in zip(fit.spec.free, fit.values, strict=True) if f.run is None or f.run in kept]
     free = [replace(f, key=_own(f, kept), run=None if f.run is None else kept.index(f.run)) for f, _ in mine]
     return replace(fit.spec, free=tuple(free)), {_own(f, kept): v for f, v in mine if f.knot is None}
+
+
+def _slopes(split: Split, fit: Fit, spec: Spec, start: Mapping[str, float]) -> Fit | None:
+    """Return a fit's slopes where a split's runs have them, for one of these runs to begin with; None where it has none."""
+    if fit.jacobian is None or fit.jacobian.shape != (split.fitted.size, len(fit.spec.free)):
+        return None
+    mine = [c for c, f in enumerate(fit.spec.free) if f.run is None or f.run in split.kept]
+    values = np.array([start.get(f.key, f.start) for f in spec.free])
+    return replace(fit, spec=spec, values=values, jacobian=fit.jacobian[split.fitted][:, mine])
 
 
 def _hardly_shown(whole: Fit, part: Fit, kept: Sequence[int]) -> list[str]:
@@ -149,7 +161,8 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, n
     if colour is not None:
         problem.take_for(colour)
     beside = not split.alone and not {RUN_AMBIENT, RUN_SENSOR}.isdisjoint(spec.effects)
-    fitted = problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS, errors=beside)
+    near = _slopes(split, fit, spec, start) if fit.weighed == colour else None
+    fitted = problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS, errors=beside, near=near)
     # what only the left-out run shows, these do not tell: it stays, and what is known beside it alone goes with it
     if known := {key: start[key] for key in (*fitted.stuck, *_hardly_shown(fit, fitted, kept)) if key in start}:
         start = fitted.as_dict() | known
@@ -179,6 +192,17 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, n
     return off, room.without(off, off - off_in(ambient + 1.0, around), math.hypot(sigma, room.MOVES_K), alike)
 
 
+def of_a_run(each: Sequence[np.ndarray]) -> float:
+    """Return the error, degC rms, of a run by those of several: how large it is in each is fitted, and of their one likelihood the mean
+    is that of logarithms. So no run in which all models err, as of a start that nobody saw, outweighs the others."""
+    count = sum(one.size for one in each)
+    return (
+        math.exp(sum(one.size * math.log(max(rms([one]), 1e-9)) for one in each if one.size) / count)
+        if count
+        else math.nan
+    )
+
+
 def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> tuple[float, float, float]:
     """Return how warm the room of a run was, one sigma of it and how warm what was around its springs, as `predict` tells it by the runs
     that were fitted."""
@@ -199,7 +223,7 @@ class Unseen:
 
     def __post_init__(self) -> None:
         self.splits = splits(self.problem)
-        self.known: dict[Any, tuple[np.ndarray, np.ndarray]] = {}
+        self.known: dict[Any, tuple[list[np.ndarray], list[np.ndarray]]] = {}
         self.lag = next((one for one in self.found.candidates if one.effect == LAG), None)
         self.lagged = self.base
         if self.lag is not None and LAG not in self.base.spec.effects:
@@ -210,23 +234,22 @@ class Unseen:
             self.lagged = self.problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS)
             self.problem.take_for(colour)
 
-    def errors(self, fit: Fit, colour: Colour | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Return the errors, degC, of runs left out, the others fitted by how errors last, and those without what their rooms
-        explain; empty where none can be."""
+    def errors(self, fit: Fit, colour: Colour | None = None) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Return the errors, degC, of each run left out, the others fitted by how errors last, and those without what their rooms
+        explain; none where none can be."""
         key = fit.spec.variant, tuple(free.prior for free in fit.spec.free), colour
         if key not in self.known:
-            each = [(np.zeros(0), np.zeros(0)), *(errors(one, fit, colour) for one in self.splits)]
-            off, judged = (np.concatenate(one) for one in zip(*each, strict=True))
-            self.known[key] = off, judged
+            each = [errors(one, fit, colour) for one in self.splits]
+            self.known[key] = [off for off, _ in each], [judged for _, judged in each]
         return self.known[key]
 
     def rmse(self, fit: Fit, colour: Colour | None = None) -> float:
-        """Return the error, degC rms, that a model is judged by: of runs left out, their rooms apart; NaN where none can be."""
-        return rms([self.errors(fit, colour)[1]])
+        """Return the error, degC rms, that a model is judged by: of a run left out, its room apart; NaN where none can be."""
+        return of_a_run(self.errors(fit, colour)[1])
 
     def foretells(self, fit: Fit, colour: Colour | None = None) -> float:
-        """Return the error, degC rms, of runs left out, their rooms told by their first minutes."""
-        return rms([self.errors(fit, colour)[0]])
+        """Return the error, degC rms, of a run left out, its room told by its first minute."""
+        return of_a_run(self.errors(fit, colour)[0])
 
     def own(self, fit: Fit) -> float:
         """Return the error of what was found, or a part of it, its numbers as likely as the problem's colour has them."""
@@ -280,10 +303,12 @@ class Unseen:
         """Return what part of that by which an effect changes what is foretold of the unseen is there: 1 of a cause, 0.5 where it
         is foretold no better than without. Infinite where it changes next to nothing."""
         off = self.errors(without, self.problem.colour)[1]
-        moved = off - self.errors(fit, self.problem.colour)[1]
-        if float(moved @ moved) < (EQUIVALENT * self.problem.noise_c) ** 2 * moved.size:
+        moved = [one - other for one, other in zip(off, self.errors(fit, self.problem.colour)[1], strict=True)]
+        if rms(moved) < EQUIVALENT * self.problem.noise_c:
             return math.inf
-        return float(off @ moved) / float(moved @ moved)
+        large = [max(rms([one]), self.problem.noise_c) ** 2 for one in off]  # a run counts by its own likelihood
+        there = sum(float(one @ by) / size for one, by, size in zip(off, moved, large, strict=True))
+        return there / sum(float(by @ by) / size for by, size in zip(moved, large, strict=True))
 
     def carried(self, fit: Fit, reduced: Callable[[Fit, str], Fit]) -> Fit:
         """Return a fit without what is of that day: no other run tells that, and beside it a part of the runs tells little of

@@ -27,6 +27,8 @@ class Fit:
     """Per run (rows, springs), degC, NaN where nothing was measured."""
     jacobian: np.ndarray | None = None
     """d(residual / noise) / d(inner coordinate), (count, free)."""
+    weighed: Colour | str | None = None
+    """How readings were weighed there (`Problem.weighed`)."""
     vector: np.ndarray | None = None
     firm: float = 1.0
     """How many times as firmly what is believed of its numbers stood against the readings."""

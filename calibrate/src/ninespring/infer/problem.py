@@ -173,6 +173,11 @@ class Problem:
         self.colour = colour
         self._start_bases()
 
+    @property
+    def weighed(self) -> Colour | str | None:
+        """Return how readings are weighed: by how errors last; None: as white noise; beside what has no name."""
+        return self.colour if self.unnamed is None and self.heat is None else "beside what has no name"
+
     # ---- simulation -------------------------------------------------------------------------------------
 
     def ambient_of(self, run_index: int, values: Mapping[str, float]) -> np.ndarray | None:
@@ -498,7 +503,8 @@ class Problem:
         values = np.array([min(f.high, max(f.low, v)) for f, v in zip(free, values, strict=True)], dtype=float)
         if not free:
             slopes, covariance = np.zeros((self.count, 0)), np.zeros((0, 0))
-            return self.evaluate(Fit(spec, values, math.nan, self.count, [], slopes, covariance=covariance))
+            bare = Fit(spec, values, math.nan, self.count, [], slopes, self.weighed, covariance=covariance)
+            return self.evaluate(bare)
 
         def show(numbers: np.ndarray) -> Shown:
             shown = self.predictions(spec, numbers)
@@ -522,6 +528,7 @@ class Problem:
             self.count,
             self.residuals(shown),
             jac if settle or not way.mended else None,
+            self.weighed,
             vector,
             firm=way.firm,
         )
@@ -590,7 +597,7 @@ class Problem:
 
     def with_slopes(self, fit: Fit) -> Fit:
         """Return a fit with its slopes."""
-        return fit if fit.jacobian is not None else replace(fit, jacobian=self.slopes(fit))
+        return fit if fit.jacobian is not None else replace(fit, jacobian=self.slopes(fit), weighed=self.weighed)
 
     def plain_slopes(self, fit: Fit) -> np.ndarray:
         """Return a fit's slopes with no error whitened out, (count, free)."""
@@ -605,7 +612,8 @@ class Problem:
         A sandwich: J'J inverse around the long-run covariance of J'r over blocks in time (all springs of a block
         together), never less than what white noise alone would give.
         """
-        jac = fit.jacobian = self.slopes(fit)
+        jac, fit.weighed = self.slopes(fit), self.weighed
+        fit.jacobian = jac
         used = [k for k, f in enumerate(fit.spec.free) if f.key not in fit.stuck]
         covariance = np.full((jac.shape[1], jac.shape[1]), 0.0)
         fit.factor = self.alike([left / noise for left, noise in zip(fit.residual, self.noise, strict=True)])
