@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from ninespring.find import diagnosis, doubt, plausibility, resistance
 from ninespring.io import results, statistics
-from ninespring.io.logs import read_log, write_atomically
+from ninespring.io.logs import condense, read_log, write_atomically
 from ninespring.model.models import Array, model_text, read_model
 from ninespring.say import page
 
@@ -79,6 +79,17 @@ def test_a_shifted_clock_is_measured_both_ways(make_log, rows: int, word: str) -
     (said,) = plausibility.shifted_clock(problem, (fit,))
     match = re.search(rf"come about (\d+) s {word} the inputs", said)
     assert match and abs(int(match[1]) - abs(rows)) <= 1
+
+
+@pytest.mark.parametrize("late_s", [20, -20])
+def test_a_shifted_clock_of_hours_is_measured_in_seconds(make_log, late_s: int) -> None:
+    """Rows that were averaged are the longer the longer nothing was switched: so many of them are no time."""
+    run = condense(read_log(make_log(change=lambda c: later(c, late_s))), 300)
+    assert np.ptp(np.diff(run.time_s)) > 2.0
+    problem, fit, _ = diagnosis.fit_effects(Array(), [run], [])
+    (said,) = plausibility.shifted_clock(problem, (fit,))
+    match = re.search(r"come about (\d+) s", said)
+    assert match and abs(int(match[1]) - abs(late_s)) <= 2
 
 
 def test_a_clock_that_is_right_is_not_suspected(make_log) -> None:

@@ -25,6 +25,8 @@ ON_A_STEP = 0.01
 """Of a step, how far from a whole number of them a reading may be: what the digits of a log leave."""
 FINE_K = 0.15
 """Steps of a thermometer that matter to nobody: what the chip's arithmetic may be off by."""
+SHORT = 0.05
+"""Part of the rows that are no longer than the step by which a clock is tried: long logs are averaged, some rows to a minute."""
 HOTTER_C = 5.0
 """By how much, degC, a spring that is never driven must outdo all others before its current is called missing."""
 
@@ -125,38 +127,32 @@ def coarse(runs: Sequence[Run]) -> list[str]:
     ]
 
 
-def _moved(run: Run, rows: int) -> Run:
-    """Return the run with its temperatures moved later by so many rows (earlier where negative)."""
-    if rows == 0:
-        return run
-    moved = np.full_like(run.temperature_c, np.nan)
-    if rows > 0:
-        moved[rows:] = run.temperature_c[:-rows]
-        moved[:rows] = run.temperature_c[0]
-    else:
-        moved[:rows] = run.temperature_c[-rows:]
-    return replace(run, temperature_c=moved)
+def _moved(run: Run, seconds: float) -> Run:
+    """Return the run with its temperatures moved later by so much (earlier where negative); rows may be uneven."""
+    before, columns = run.time_s - seconds, run.temperature_c.T
+    moved = [np.interp(before, run.time_s, one, left=one[0], right=np.nan) for one in columns]
+    return replace(run, temperature_c=np.column_stack(moved)) if seconds else run
 
 
 def shifted_clock(problem: Problem, fits: Sequence[Fit]) -> list[str]:
     """Return a warning where temperatures and inputs belong to different times.
 
-    Tried only where structure is left: the temperatures are moved by 1 to 128 rows, later (an effect before its
-    cause: no physics does that) and, with the last
-    of the models, earlier; each is fitted again, as it is where they are, and the best is refined to one row.
+    Tried only where structure is left: the temperatures are moved by 1 to 128 steps of the shortest rows, later (an effect before
+    its cause: no physics does that) and, with the last
+    of the models, earlier; each is fitted again, as it is where they are, and the best is refined to one step.
     """
-    step = float(np.median(np.diff(problem.runs[0].time_s)))
-    shortest = min(len(run.time_s) for run in problem.runs)
+    step = float(np.quantile(np.diff(problem.runs[0].time_s), SHORT))
+    shortest = min(run.duration_s for run in problem.runs)
     tried: dict[tuple[int, int], float] = {}
 
     def error(which: int, rows: int) -> float:
         if (which, rows) not in tried:
             fit = fits[which]
-            if abs(rows) > shortest // 4:
+            if abs(rows) * step > shortest / 4:
                 tried[which, rows] = np.inf
             else:
                 # the clock as it is, too: a fit whose errors last is not the one that leaves least
-                trial = Problem(problem.array, [_moved(run, rows) for run in problem.runs], problem.declared)
+                trial = Problem(problem.array, [_moved(run, rows * step) for run in problem.runs], problem.declared)
                 again = trial.fit(fit.spec, fit.as_dict(), tolerance=1e-3, max_steps=8)
                 tried[which, rows] = statistics.rms(again.residual)
         return tried[which, rows]

@@ -9,7 +9,8 @@ GAIN, OFFSET = "sensor_gain", "sensor_offset_k"
 BEHIND = "holder_mass", "plate_conduction"
 """What keeps heat behind springs, behind all of them alike."""
 OR_ITS_SPRING = (
-    "Or: what its spring is mounted on, or its drive, is unlike the others'. These readings do not tell which. "
+    "Or: its spring is unlike the others in what it is mounted on, in its drive, or in what neighbours give it. These readings do not "
+    "tell which. "
     "Exchange two thermometers and record again: what goes along is the thermometer's."
 )
 
