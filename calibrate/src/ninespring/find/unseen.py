@@ -8,7 +8,7 @@ known no better counts in what is told, not in what models are judged by.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -64,8 +64,6 @@ class Split:
     left_out: Run
     counts: np.ndarray
     """(rows, springs): where the left-out run's error counts."""
-    fitted: np.ndarray
-    """(readings of all runs,): those that are fitted."""
     alone: bool = False
 
 
@@ -78,8 +76,7 @@ def splits(problem: Problem) -> list[Split]:
     for r in range(max(0, len(runs) - MOST), len(runs)):
         kept = [k for k in range(len(runs)) if k != r]
         part = _problem(problem, [runs[k] for k in kept], kept)
-        fitted = problem.of_samples([np.full((1, 1), k != r) for k in range(len(runs))])
-        out.append(Split(part, tuple(kept), runs[r], problem.mask[r], fitted))
+        out.append(Split(part, tuple(kept), runs[r], problem.mask[r]))
     return out
 
 
@@ -91,7 +88,7 @@ def _ahead(problem: Problem, seen: float) -> Split | None:
     if not np.isfinite(shown).any() or not (problem.mask[0] & late[:, None]).any():
         return None
     part = _problem(problem, [replace(run, temperature_c=shown)], [0])
-    return Split(part, (0,), run, problem.mask[0] & late[:, None], problem.of_samples([~late[:, None]]), alone=True)
+    return Split(part, (0,), run, problem.mask[0] & late[:, None], alone=True)
 
 
 def _problem(whole: Problem, runs: Sequence[Run], kept: Sequence[int]) -> Problem:
@@ -113,15 +110,6 @@ def _of_these(fit: Fit, kept: Sequence[int]) -> tuple[Spec, dict[str, float]]:
     mine = [(f, float(v)) for f, v in zip(fit.spec.free, fit.values, strict=True) if f.run is None or f.run in kept]
     free = [replace(f, key=_own(f, kept), run=None if f.run is None else kept.index(f.run)) for f, _ in mine]
     return replace(fit.spec, free=tuple(free)), {_own(f, kept): v for f, v in mine if f.knot is None}
-
-
-def _slopes(split: Split, fit: Fit, spec: Spec, start: Mapping[str, float]) -> Fit | None:
-    """Return a fit's slopes where a split's runs have them, for one of these runs to begin with; None where it has none."""
-    if fit.jacobian is None or fit.jacobian.shape != (split.fitted.size, len(fit.spec.free)):
-        return None
-    mine = [c for c, f in enumerate(fit.spec.free) if f.run is None or f.run in split.kept]
-    values = np.array([start.get(f.key, f.start) for f in spec.free])
-    return replace(fit, spec=spec, values=values, jacobian=fit.jacobian[split.fitted][:, mine])
 
 
 def _hardly_shown(whole: Fit, part: Fit, kept: Sequence[int]) -> list[str]:
@@ -161,8 +149,7 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, n
     if colour is not None:
         problem.take_for(colour)
     beside = not split.alone and not {RUN_AMBIENT, RUN_SENSOR}.isdisjoint(spec.effects)
-    near = _slopes(split, fit, spec, start) if fit.weighed == colour else None
-    fitted = problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS, errors=beside, near=near)
+    fitted = problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS, errors=beside)
     # what only the left-out run shows, these do not tell: it stays, and what is known beside it alone goes with it
     if known := {key: start[key] for key in (*fitted.stuck, *_hardly_shown(fit, fitted, kept)) if key in start}:
         start = fitted.as_dict() | known
@@ -195,12 +182,8 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, n
 def of_a_run(each: Sequence[np.ndarray]) -> float:
     """Return the error, degC rms, of a run by those of several: how large it is in each is fitted, and of their one likelihood the mean
     is that of logarithms. So no run in which all models err, as of a start that nobody saw, outweighs the others."""
-    count = sum(one.size for one in each)
-    return (
-        math.exp(sum(one.size * math.log(max(rms([one]), 1e-9)) for one in each if one.size) / count)
-        if count
-        else math.nan
-    )
+    logarithms = [math.log(max(rms([one]), 1e-9)) for one in each if one.size]
+    return math.exp(np.average(logarithms, weights=[one.size for one in each if one.size])) if logarithms else math.nan
 
 
 def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> tuple[float, float, float]:
