@@ -223,7 +223,10 @@ class Unseen:
         key = fit.spec.variant, tuple(free.prior for free in fit.spec.free), colour
         if key not in self.known:
             each = [errors(one, fit, colour) for one in self.splits]
-            self.known[key] = [off for off, _ in each], [judged for _, judged in each]
+            off, judged = [off for off, _ in each], [judged for _, judged in each]
+            if each and self.splits[0].alone:  # parts of one run, whose errors are of one size
+                off, judged = [np.concatenate(off)], [np.concatenate(judged)]
+            self.known[key] = off, judged
         return self.known[key]
 
     def rmse(self, fit: Fit, colour: Colour | None = None) -> float:
