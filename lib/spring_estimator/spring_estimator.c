@@ -352,6 +352,7 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     const uint8_t phase = may_be_hot ? SPRING_PHASE_AUSTENITE : SPRING_PHASE_MARTENSITE;
     const float middle_c = 0.5f * (spring_c(low_c7) + spring_c(high_c7));
     const uint8_t fresh = b->fresh;
+    const float current_a = b->current_a;
     const bool heating = b->heating;
     const spring_before_t before = spring_before(b, model, k);
     const float sd_k = UNIFORM_SD * spring_c((int16_t)(high_c7 - low_c7));
@@ -359,6 +360,7 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     spring_set_temperature(model, k, middle_c, phase);
     b->last_c7 = thermal_model_temperature_c7(model, k);
     b->fresh = fresh;
+    b->current_a = current_a;
     b->seen = true;
     spring_note(e, model, k, SPRING_SIGHT_LOOKED, &before, middle_c, sd_k);
     if (heating) {
@@ -430,7 +432,9 @@ static void take_turn(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
         /* a spring that waits cools by no less than the least loss: more would hide a finish */
         b->run.heat.heat_k += heat_k < 0.0f ? LEAST_LOSS * heat_k : heat_k;
         /* and one that may lose more takes up less: a weak heating that looks like an end */
-        b->run.heat.flat_k += heat_k - (1.0f - LEAST_LOSS) * e->turn_k_per_w * b->gives_w;
+        if (b->onset) {
+            b->run.heat.flat_k += heat_k - (1.0f - LEAST_LOSS) * e->turn_k_per_w * b->gives_w;
+        }
     }
     if (b->reads && e->observes && !spring_is_loose(b)) {
         look(e, model, k);
@@ -465,7 +469,7 @@ static void take_turn(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
             return;
         }
     }
-    if (b->possible == SPRING_PHASE_AUSTENITE && b->fresh == 0 &&
+    if (b->possible == SPRING_PHASE_AUSTENITE && (b->fresh == 0 || b->current_a < WEAK_A) &&
         spring_estimator_distance_k(e, model, k).low < 0.0f) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE; /* nothing tells any more */
     }
@@ -616,6 +620,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
                           !spring_estimator_has_transformed(e, model, k);
     const spring_before_t before = spring_before(b, model, k);
     const bool unseen = full && b->heating && b->possible != SPRING_PHASE_AUSTENITE;
+    const bool was_austenite = b->possible == SPRING_PHASE_AUSTENITE;
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {
         /* as hot as it may be, and what it reads shows none of it, or says that phase is missing */
         b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE ||
@@ -634,7 +639,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     b->lost = 0.0f;
     b->quiet = 0;
     b->losing = 0;
-    const bool strong = full && b->reads && b->current_a > STRONG_A;
+    const bool strong = (full || was_austenite) && b->current_a > STRONG_A && b->fresh != 0;
     spring_begin_hold_line(e, b, strong);
     if (unseen) {
         spring_note(e, model, k, SPRING_SIGHT_UNSEEN, &before, 0.0f, 0.0f);

@@ -67,6 +67,8 @@ typedef struct {
     float onset_k;  /* heat taken up until then; until it is seen, until its change began */
     float cold_ohm; /* at its beginning, martensite; 0: it was not */
     float cold_c;
+    float rise;    /* of it while that was surely martensite, */
+    float rise_k;  /* over so much heat */
     float excess;  /* change that no temperature coefficient explains; signed */
     float flat_k;  /* heat since, without such a change */
     float was_ohm; /* its austenite's as it began; 0: not known */

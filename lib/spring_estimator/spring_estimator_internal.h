@@ -200,6 +200,9 @@ float spring_offset_may_show(const spring_belief_t *belief, float ohm, float fro
 void spring_average_anew(spring_belief_t *belief);
 /* Of the average, relative; share: of a turn in it. */
 float spring_slow_variance(const spring_belief_t *belief, float share);
+/* The current has dropped, the spring is what it was a moment ago: what reads otherwise is the
+ * sensor's offset. Returns whether this turn told one. */
+bool spring_learn_offset(spring_belief_t *belief);
 /* What it reads on average now is what it reads with the phase that it has. Rough: it still moves,
  * another one follows when it is at rest. */
 void spring_begin_line(spring_belief_t *belief, bool rough, float share);

@@ -6,7 +6,11 @@
 #define STEP_PER_NOISE 1600.0f /* so that a slope's noise is half of the largest coefficient */
 #define EXCESS_SEEN    0.01f   /* a change that no coefficient explains, and that is no noise */
 #define EXCESS_SDS     4.0f
-#define FLAT_K         4.0f /* of heat without a change: it is over */
+/* A martensite's own may go on so much steeper: a quarter of the largest, as losses make a kelvin
+ * of heat less on the way up. Over 10 K four of a turn's noise, 0.1 %, are as much. */
+#define RISE_MORE_PER_K 0.0004f
+#define RISE_LEAST_K    10.0f
+#define FLAT_K          4.0f /* of heat without a change: it is over */
 /* The last of a cosine is flatter than the largest coefficient, the longer the less it changes:
  * 2 (0.0015 / 0.85) H^2 / pi^2, H = 47 K of heat from its start to its finish. */
 #define FLAT_CHANGE_K  0.8f
@@ -102,7 +106,6 @@ static void see_finish(spring_estimator_t *e, spring_belief_t *b, thermal_model_
     spring_learn_austenite(b);
     b->possible = SPRING_PHASE_AUSTENITE;
     b->blind = false;
-    b->steep = false;
     b->lost = 0.0f;
     const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
     const float seen_c = spring_c(finish_c7) + beyond_k;
@@ -174,11 +177,21 @@ static bool is_over(const spring_belief_t *b, const thermal_model_t *model, uint
            fabsf(b->ohm / b->run.heat.onset_ohm - 1.0f) > EXCESS_SEEN;
 }
 
-/* What no temperature coefficient in print makes of a change over step_k of heat. */
-static float unexplained(float change, float step_k)
+/* What no temperature coefficient makes of a change over step_k of heat: of a martensite its own,
+ * where that was seen, else any in print. */
+static float unexplained(const spring_belief_t *b, float change, float step_k)
 {
-    const float more = change - COEFFICIENT_MOST_PER_HEAT_K * step_k;
-    const float less = change - COEFFICIENT_LEAST_PER_HEAT_K * step_k;
+    float most_per_k = COEFFICIENT_MOST_PER_HEAT_K;
+    float least_per_k = COEFFICIENT_LEAST_PER_HEAT_K;
+    if (b->possible == SPRING_PHASE_MARTENSITE && b->run.heat.rise_k > RISE_LEAST_K) {
+        const float per_k = 1.0f / b->run.heat.rise_k;
+        const float own_per_k = b->run.heat.rise * per_k;
+        const float unsure_per_k = RISE_MORE_PER_K + EXCESS_SDS * b->noise * per_k;
+        most_per_k = fminf(most_per_k, own_per_k + unsure_per_k);
+        least_per_k = fmaxf(least_per_k, own_per_k - unsure_per_k);
+    }
+    const float more = change - most_per_k * step_k;
+    const float less = change - least_per_k * step_k;
     return more > 0.0f ? more : less < 0.0f ? less : 0.0f;
 }
 
@@ -284,7 +297,13 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
     }
     const float ohm = b->run.heat.sum_ohm / turns;
     const float change = ohm / b->run.heat.mark_ohm - 1.0f;
-    const float excess = unexplained(change, step_k);
+    const float start_c = spring_c(thermal_model_transformation(model, k).austenite_start_c7);
+    const bool may_be_onset = may_transform(b, model, k, start_c);
+    if (!may_be_onset) { /* all of it is its martensite's own */
+        b->run.heat.rise += change;
+        b->run.heat.rise_k += step_k;
+    }
+    const float excess = unexplained(b, change, step_k);
     /* a spring whose change is known changes that way */
     const bool against = b->learnt.austenite_ohm > 0.0f && excess * b->learnt.change < 0.0f;
     if (!b->onset && (against || excess * b->run.heat.excess <= 0.0f)) {
@@ -300,8 +319,7 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         b->run.heat.flat_k = 0.0f;
     }
     if (!b->onset && fabsf(b->run.heat.excess) > EXCESS_SEEN + EXCESS_SDS * b->noise) {
-        const float start_c = spring_c(thermal_model_transformation(model, k).austenite_start_c7);
-        if (may_transform(b, model, k, start_c)) {
+        if (may_be_onset) {
             see_onset(e, b, model, k, start_c);
             b->steep = true;
         } else {

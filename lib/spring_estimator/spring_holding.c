@@ -51,8 +51,11 @@ static bool is_misread(const spring_belief_t *b, const thermal_model_t *model, u
 
 /* The current has dropped, the spring is what it was a moment ago: what reads otherwise is the
  * sensor's offset. Returns whether this turn told one. */
-static bool learn_offset(spring_belief_t *b)
+bool spring_learn_offset(spring_belief_t *b)
 {
+    if (b->offset_sd_v <= OFFSET_LEAST_V) {
+        return false;
+    }
     const float less_a = b->run.line.a - b->current_a;
     const float product_a2 = b->current_a * b->run.line.a;
     if (less_a < APART_PER_A * product_a2 || b->run.line.way_k < -ANCHOR_K) {
@@ -251,7 +254,7 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
             return;
         }
         spring_begin_line(b, false, share);
-    } else if (b->quiet == 0 && b->offset_sd_v > OFFSET_LEAST_V && learn_offset(b)) {
+    } else if (b->quiet == 0 && spring_learn_offset(b)) {
         return;
     }
     if (b->quiet < (b->rough ? SPRING_ESTIMATOR_REST_TURNS : 1) && b->current_a < WEAK_A) {
@@ -290,7 +293,7 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         if (b->trial && spring_is_other_way(b, left) && changed > least) {
             spring_begin_line(b, true, share); /* what creeps hides no loss from here */
         }
-        if (rests || b->trial) { /* its average is of where it was */
+        if ((rests && b->current_a >= WEAK_A) || b->trial) { /* its average is of where it was */
             const float moved_since_k = fminf(line->way_k - line->slow_k, 0.0f);
             spring_keep_above(e, b, model, k,
                               spring_lost_at_c(model, k, b->lost) - STILL_K + moved_since_k);

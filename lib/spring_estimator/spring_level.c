@@ -43,6 +43,9 @@ void spring_level_watch(spring_estimator_t *e, spring_belief_t *b, thermal_model
         }
         return;
     }
+    if (spring_learn_offset(b)) {
+        return;
+    }
     const float left = spring_has_left(b);
     const spring_departure_t d = spring_departs(b, model, k, left * left, 0.0f, SURE_SDS, share);
     if (d.sure && !spring_is_other_way(b, left)) {

@@ -351,6 +351,53 @@ TEST(onset_is_a_change_that_no_coefficient_makes)
     }
 }
 
+/* As long as it surely is martensite its own rise with heat is told, step by step; from 10 K on
+ * nothing beyond that, a quarter of the largest coefficient and its noise is a coefficient. */
+TEST(rise_of_its_own_martensite_is_no_onset)
+{
+    static const struct {
+        double c;
+        bool told;
+    } tells[] = {{79.0, true}, {81.0, false}, {40.0, true}};
+    for (size_t n = 0; n < ROWS(tells); n++) {
+        begin_heating_at(tells[n].c, M, 14.0);
+        row(n);
+        INSIDE.run.heat.rise = 0.012f;
+        INSIDE.run.heat.rise_k = 8.0f;
+        INSIDE.ohm = 0.201f;
+        spring_heating_watch(&estimator, &INSIDE, &model, 0);
+        NEAR(tells[n].told ? 12.0 : 8.0, INSIDE.run.heat.rise_k);
+        NEAR(tells[n].told ? 0.017 : 0.012, INSIDE.run.heat.rise);
+    }
+    static const struct {
+        uint8_t possible;
+        double rise_k, rise_per_k, most_per_k, least_per_k;
+    } table[] = {
+        {M, 9.9, 0.001, MOST_PER_K, LEAST_PER_K},
+        {M, 10.1, 0.001, 0.0014 + 0.004 / 10.1, 0.0006 - 0.004 / 10.1},
+        {M, 40.0, 0.001, 0.0015, 0.0005},
+        {M, 40.0, -0.0001, 0.0004, LEAST_PER_K},
+        {M, 40.0, 0.0016, MOST_PER_K, 0.0011},
+        {B, 40.0, 0.001, MOST_PER_K, LEAST_PER_K},
+    };
+    for (size_t n = 0; n < 2 * ROWS(table); n++) {
+        for (int beyond = 0; beyond < 2; beyond++) {
+            const bool less = n % 2u != 0;
+            begin_heating_at(85.0, table[n / 2u].possible, 14.0);
+            row(n);
+            INSIDE.run.heat.rise_k = (float)table[n / 2u].rise_k;
+            INSIDE.run.heat.rise = (float)(table[n / 2u].rise_per_k * table[n / 2u].rise_k);
+            const double is = beyond ? 0.0142 : 0.0138; /* 1 % and 4 of a noise of 0.1 % */
+            const double change =
+                4.0 * (less ? table[n / 2u].least_per_k : table[n / 2u].most_per_k) +
+                (less ? -is : is);
+            INSIDE.ohm = (float)(0.2 * (1.0 + change));
+            spring_heating_watch(&estimator, &INSIDE, &model, 0);
+            TEST_ASSERT_EQUAL(beyond, INSIDE.onset);
+        }
+    }
+}
+
 /* A slow step compares the mean of its turns with that of the one before: the more turns, the less
  * heat it needs (a 1600th of the noise, over the root of them; 2 K), and the less is noise. */
 TEST(slow_step_compares_means)
@@ -1119,6 +1166,33 @@ TEST(line_follows_what_keeps_its_phase)
     }
 }
 
+/* A current that tells nothing keeps nothing: below 0.6 A it is as cold as it is believed to be,
+ * and may have lost its phase. */
+TEST(what_is_read_too_weakly_keeps_no_phase)
+{
+    static const struct {
+        double current_a;
+        bool tells;
+    } table[] = {{0.59, false}, {0.61, true}, {0.3, false}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_line_at(0.25);
+        row(n);
+        put(70.0);
+        INSIDE.quiet = 40;
+        INSIDE.current_a = INSIDE.slow_a = INSIDE.run.line.a = (float)table[n].current_a;
+        spring_holding_watch(&estimator, &INSIDE, &model, 0, 0.0f, 0.0625f);
+        TEST_ASSERT_FLOAT_WITHIN(0.02f, table[n].tells ? 77.5f : 70.0f, spring_now_c(&model, 0));
+        begin_line_at(0.25);
+        put(70.0);
+        INSIDE.quiet = 40;
+        INSIDE.slow_a = INSIDE.run.line.a = (float)table[n].current_a;
+        give(table[n].current_a, 0.25);
+        spring_seal(&estimator, 0);
+        TEST_ASSERT_TRUE(spring_estimator_update(&estimator, &model, 0));
+        TEST_ASSERT_EQUAL_UINT8(table[n].tells ? A : A | B, INSIDE.possible);
+    }
+}
+
 /* Where its slope is known, by more than its sd, what it leaves its line by at rest tells each 4 s
  * that it is hotter or colder, and loses less or more: the less, the more its readings wander. The
  * line follows by the rest. */
@@ -1209,6 +1283,35 @@ TEST(drop_of_the_current_tells_the_offset)
             NEAR(moved_k, INSIDE.run.line.slow_k);
         }
     }
+}
+
+static void begin_level_at(double c, double more);
+
+/* So it does from fully on to a level: nothing of it is lost phase. */
+TEST(drop_to_a_level_tells_the_offset)
+{
+    begin_level_at(84.0, 0.0);
+    INSIDE.offset_sd_v = 0.005f;
+    INSIDE.run.line.a = 3.0f;
+    INSIDE.current_a = 1.1f;
+    INSIDE.ohm = 0.237f;
+    const double apart_a = 3.0 * 1.1 / 1.9;
+    const double read_v2 = pow(0.0005, 2) + pow(0.001 * 0.237 * apart_a, 2);
+    const double more_v = -0.003 * apart_a * 25e-6 / (25e-6 + read_v2);
+    INSIDE.noise = 1e-3f;
+    spring_level_watch(&estimator, &INSIDE, &model, 0, 0.0f, 0.25f);
+    TEST_ASSERT_TRUE(INSIDE.seen);
+    TEST_ASSERT_EQUAL_FLOAT(0.1f, INSIDE.lost);
+    NEAR(1e3 * more_v, 1e3f * INSIDE.learnt.offset_v);
+    NEAR(0.24 - more_v / 3.0, INSIDE.run.line.ohm);
+    const float told_v = INSIDE.learnt.offset_v;
+    INSIDE.offset_sd_v = 0.0005f; /* it is known: what is read now is not it */
+    INSIDE.current_a = 1.1f;
+    INSIDE.ohm = 0.235f;
+    INSIDE.seen = false;
+    spring_level_watch(&estimator, &INSIDE, &model, 0, 0.0f, 0.25f);
+    TEST_ASSERT_FALSE(INSIDE.seen);
+    TEST_ASSERT_EQUAL_FLOAT(told_v, INSIDE.learnt.offset_v);
 }
 
 /* The line begins at rest (10 s below 0.3 K/s), or anew with eight turns and each 3 K until then;
