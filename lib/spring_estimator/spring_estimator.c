@@ -352,7 +352,6 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     const uint8_t phase = may_be_hot ? SPRING_PHASE_AUSTENITE : SPRING_PHASE_MARTENSITE;
     const float middle_c = 0.5f * (spring_c(low_c7) + spring_c(high_c7));
     const uint8_t fresh = b->fresh;
-    const float current_a = b->current_a;
     const bool heating = b->heating;
     const spring_before_t before = spring_before(b, model, k);
     const float sd_k = UNIFORM_SD * spring_c((int16_t)(high_c7 - low_c7));
@@ -360,7 +359,6 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     spring_set_temperature(model, k, middle_c, phase);
     b->last_c7 = thermal_model_temperature_c7(model, k);
     b->fresh = fresh;
-    b->current_a = current_a;
     b->seen = true;
     spring_note(e, model, k, SPRING_SIGHT_LOOKED, &before, middle_c, sd_k);
     if (heating) {
@@ -424,6 +422,7 @@ static void take_turn(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     const int16_t before_c7 = b->last_c7;
     b->seen = false;
     const float share = spring_take_readings(e, model, k);
+    const bool tells = b->fresh != 0 && b->current_a >= WEAK_A;
     const float power_w = b->reads ? b->current_a * b->current_a * b->ohm : 0.0f;
     const float heat_k = predict(e, b, model, k, power_w);
     const float moved_k = spring_c((int16_t)(b->last_c7 - before_c7));
@@ -469,7 +468,7 @@ static void take_turn(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
             return;
         }
     }
-    if (b->possible == SPRING_PHASE_AUSTENITE && (b->fresh == 0 || b->current_a < WEAK_A) &&
+    if (b->possible == SPRING_PHASE_AUSTENITE && !tells &&
         spring_estimator_distance_k(e, model, k).low < 0.0f) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE; /* nothing tells any more */
     }

@@ -207,7 +207,8 @@ bool spring_estimator_lacks_contact(const spring_estimator_t *e, const thermal_m
     const spring_belief_t *b = &e->spring[k];
     const bool holds = !b->heating && b->possible == SPRING_PHASE_AUSTENITE;
     const float ohm = b->heating ? b->run.heat.cold_ohm : holds ? b->learnt.austenite_ohm : 0.0f;
-    return spring_is_sound(e, k) && model->parameters.contact_uohm[k] != 0 && ohm > 0.0f &&
+    /* as a rule none is declared: checksums of nine springs are a millisecond of a late tick */
+    return model->parameters.contact_uohm[k] != 0 && spring_is_sound(e, k) && ohm > 0.0f &&
            behind_contact_ohm(model, k, ohm) < UNLIKE_LEAST * e->martensite_ohm;
 }
 
