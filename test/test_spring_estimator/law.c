@@ -282,6 +282,7 @@ TEST(look_tells_a_phase_and_a_temperature_evenly_over_its_width)
         INSIDE.current_a = (float)table[n].current_a;
         INSIDE.heating = table[n].heating;
         INSIDE.learnt.austenite_ohm = 0.25f;
+        INSIDE.learnt.martensite_ohm = 0.2f;
         INSIDE.learnt.change = (float)table[n].change;
         const double ohm = 0.25 * (1.0 - table[n].change * (1.0 - table[n].phase));
         INSIDE.slow_ohm = (float)ohm;
@@ -293,6 +294,7 @@ TEST(look_tells_a_phase_and_a_temperature_evenly_over_its_width)
         TEST_ASSERT_EQUAL_UINT8(table[n].fresh + 1, INSIDE.fresh);
         TEST_ASSERT_EQUAL(table[n].looks, INSIDE.untested);
         TEST_ASSERT_EQUAL(looked, spring_estimator_has_just_seen(BELIEF));
+        NEAR(0.25, INSIDE.learnt.austenite_ohm); /* a heating begins with no reading yet */
         TEST_ASSERT_FLOAT_WITHIN(
             0.01f, looked ? (float)(table[n].low_c + table[n].high_c) / 2.0f : 75.0f, put_c());
         if (looked) {

@@ -42,10 +42,8 @@ class _Doubles:
 
     @staticmethod
     def from_param(array: np.ndarray | None) -> object:
-        """Return where its numbers stand."""
-        return (
-            None if array is None else ctypes.c_void_p(array.__array_interface__["data"][0])
-        )  # quicker than array.ctypes
+        """Return where its numbers stand; not by array.ctypes, which takes longer than many a call."""
+        return None if array is None else ctypes.c_void_p(array.__array_interface__["data"][0])
 
 
 NOT_IN_TIME = -6
