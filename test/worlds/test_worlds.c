@@ -101,6 +101,33 @@ TEST(energy_closes_in_every_law)
     world = NULL;
 }
 
+/* A finger on a spring that cools: the latent heat that is set free warms it, but to no more than
+ * where it transforms. Of a law that begins steeply a temperature is found that its heat has, too.
+ */
+TEST(what_is_pressed_gets_no_hotter_than_where_it_transforms_in_every_law)
+{
+    for (int law = 0; law < KINETICS_COUNT; law++) {
+        setUp();
+        single_spring();
+        parameters.spring[0].alloy.law = (kinetics_law_t)law;
+        parameters.spring[0].was_austenite = true;
+        parameters.spring[0].start_c = parameters.spring[0].alloy.martensite_start_c + 3.0;
+        parameters.events = 1;
+        parameters.event[0] = (world_event_t){WORLD_STRESS_MPA, 0.5, 0, 60.0};
+        make_world();
+        for (int tick = 0; tick < 20 * TICKS_PER_S; tick++) {
+            run_s(1.0 / TICKS_PER_S);
+            const double most_c = fmax(world_martensite_start_c(world, 0),
+                                       parameters.spring[0].alloy.martensite_start_c + 3.0);
+            for (int node = 0; node < WORLD_NODES; node++) {
+                TEST_ASSERT_TRUE(world_node_c(world, 0, node) < most_c + 0.01);
+            }
+        }
+        tearDown();
+    }
+    world = NULL;
+}
+
 /* What a wire gives off, W, that is that much above the air, in moving air or not. */
 static double given_off_w(world_convection_t convection, double rise_k, double moved)
 {

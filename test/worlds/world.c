@@ -13,7 +13,7 @@
 /* Along the wire between the middles of two thirds: 18 W/mK (NiTi), 0.503 mm2, 36.7 mm. */
 #define AXIAL_W_PER_K 0.000247
 #define SHARE         (1.0 / WORLD_NODES)
-#define SOLVER_ROUNDS 6
+#define SOLVER_ROUNDS 40 /* as a rule three */
 #define SOLVER_J      1e-8 /* 1e-7 K of a node */
 
 typedef struct {
@@ -445,26 +445,30 @@ static void exchange(world_t *world, double *to_air_w, double *to_plate_w)
     }
 }
 
-/* The temperature at which the node holds its enthalpy, along the branch that leads there. Latent
- * heat is many times the sensible heat of a kelvin, so Newton's steps follow the branch; what they
- * leave stays in the enthalpy and is found by the next step. */
+/* The temperature at which the node holds its enthalpy, along the branch that leads there: heat
+ * grows with temperature on each, so what was too cold and what was too hot enclose it. Latent heat
+ * is many times the sensible heat of a kelvin, so Newton's steps follow the branch; where a law
+ * begins steeply they leave what is enclosed, and halve it instead. */
 static void settle(const world_spring_t *parameters, node_t *node, double stress_mpa)
 {
     double capacity_j_per_k = SHARE * parameters->heat_capacity_j_per_k;
     double latent_j = SHARE * parameters->latent_heat_j;
     double heating_k = stress_mpa / WORLD_HEATING_MPA_PER_K;
     double cooling_k = stress_mpa / WORLD_COOLING_MPA_PER_K;
-    double c = node->temperature_c;
+    double c = node->temperature_c, cold_c = -INFINITY, hot_c = INFINITY;
     grain_t grain = node->grain;
     double missing_j = node->enthalpy_j - capacity_j_per_k * c - latent_j * grain.latent;
-    for (int round = 0; round < SOLVER_ROUNDS; round++) {
+    for (int round = 0; round == 0 || (round < SOLVER_ROUNDS && fabs(missing_j) >= SOLVER_J);
+         round++) {
         c += missing_j / (capacity_j_per_k + latent_j * grain.latent_per_k);
+        if (c <= cold_c || c >= hot_c) {
+            c = 0.5 * (cold_c + hot_c);
+        }
         grain = node->grain;
         grain_move(&grain, &parameters->alloy, c - heating_k, c - cooling_k);
         missing_j = node->enthalpy_j - capacity_j_per_k * c - latent_j * grain.latent;
-        if (fabs(missing_j) < SOLVER_J) {
-            break;
-        }
+        cold_c = missing_j > 0.0 ? c : cold_c;
+        hot_c = missing_j < 0.0 ? c : hot_c;
     }
     node->temperature_c = c;
     node->grain = grain;
