@@ -149,6 +149,7 @@ typedef struct {
     bool trial : 1;     /* held with less power, to tell what its resistance has changed by */
     bool hot : 1;       /* in its hold it reads beyond what its austenite read when that was hot */
     bool from_full : 1; /* this heating began fully on */
+    bool single : 1;    /* its next step of heat is compared with one turn, not with a mean */
     bool unlike : 1;    /* this heating's martensite was not of the declared resistance */
     spring_learnt_t learnt;
 

@@ -284,6 +284,9 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
     if (b->run.heat.mark_ohm == 0.0f) {
         take_phase(e, b, model, k);
         begin_step(b, b->ohm);
+        b->single = true;
+        /* it changed until nothing was compared: that it rests in this heat nobody has seen */
+        b->run.heat.flat_k = b->changes ? 0.0f : b->run.heat.flat_k;
         return;
     }
     b->run.heat.turns++;
@@ -297,14 +300,17 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         return;
     }
     const float ohm = b->run.heat.sum_ohm / turns;
+    /* from mean to mean; from a single turn to the mean of those that followed it is less */
+    const float apart_k = b->single ? 0.5f * step_k * (1.0f + 1.0f / turns) : step_k;
+    b->single = false;
     const float change = ohm / b->run.heat.mark_ohm - 1.0f;
     const float start_c = spring_c(thermal_model_transformation(model, k).austenite_start_c7);
     const bool may_be_onset = may_transform(b, model, k, start_c);
     if (!may_be_onset) { /* all of it is its martensite's own */
         b->run.heat.rise += change;
-        b->run.heat.rise_k += step_k;
+        b->run.heat.rise_k += apart_k;
     }
-    const float excess = unexplained(b, change, step_k);
+    const float excess = unexplained(b, change, apart_k);
     /* a spring whose change is known changes that way */
     const bool against = b->learnt.austenite_ohm > 0.0f && excess * b->learnt.change < 0.0f;
     if (!b->onset && (against || excess * b->run.heat.excess <= 0.0f)) {

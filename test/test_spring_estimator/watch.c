@@ -461,6 +461,50 @@ TEST(heating_that_cannot_be_compared_is_marked_anew)
     }
 }
 
+/* After that its next step is from a single turn to the mean of those that follow: half of its heat
+ * and a half of a turn's. And heat in which nothing was compared is none without a change, if it
+ * had changed until then. */
+TEST(step_that_begins_anew_is_from_its_first_turn_to_a_mean)
+{
+    for (int turns = 1; turns <= 3; turns++) {
+        const double apart_k = 3.0 * 0.5 * (1.0 + 1.0 / turns);
+        for (int n = 0; n < 4; n++) {
+            const bool changed = n % 2 != 0, changes = n / 2 != 0;
+            begin_heating_at(85.0, B, 14.0);
+            row((size_t)(4 * turns + n));
+            INSIDE.onset = true;
+            INSIDE.changes = changed;
+            INSIDE.noise = 0.0f;
+            INSIDE.run.heat.mark_ohm = 0.0f;
+            INSIDE.ohm = 0.2f;
+            spring_heating_watch(&estimator, &INSIDE, &model, 0);
+            NEAR(changed ? 0.0 : 1.0, INSIDE.run.heat.flat_k);
+            const double beyond = changes ? 0.0001 : -0.0001;
+            for (int turn = 1; turn <= turns; turn++) {
+                INSIDE.run.heat.heat_k = turn < turns ? 15.9f : 17.0f; /* the last ends it */
+                INSIDE.ohm = (float)(0.2 * (1.0 + MOST_PER_K * apart_k + beyond));
+                spring_heating_watch(&estimator, &INSIDE, &model, 0);
+            }
+            TEST_ASSERT_EQUAL(changes, INSIDE.changes);
+            /* the one that follows is from mean to mean */
+            INSIDE.ohm *= (float)(1.0 + 3.0 * MOST_PER_K + beyond);
+            for (int turn = 1; turn <= 2; turn++) {
+                INSIDE.run.heat.heat_k = turn == 1 ? 18.9f : 20.0f;
+                spring_heating_watch(&estimator, &INSIDE, &model, 0);
+            }
+            TEST_ASSERT_EQUAL(changes, INSIDE.changes);
+        }
+    }
+    begin_heating_at(79.0, M, 14.0);
+    INSIDE.run.heat.cold_ohm = 0.2f;
+    INSIDE.run.heat.mark_ohm = 0.0f;
+    for (int turn = 0; turn <= 2; turn++) {
+        INSIDE.run.heat.heat_k = turn < 2 ? 14.0f + 1.9f * (float)turn : 17.0f;
+        spring_heating_watch(&estimator, &INSIDE, &model, 0);
+    }
+    NEAR(3.0 * 0.75, INSIDE.run.heat.rise_k);
+}
+
 /* Martensite's onset is seen at austenite start and 2 K, or as far on as it took up heat; more than
  * 2.6 sd below, it was a contact's. What led there is its coefficient, as any metal has. */
 TEST(onset_puts_it_at_its_start_and_teaches_its_martensite)
