@@ -223,6 +223,8 @@ typedef struct {
 spring_departure_t spring_departs(spring_belief_t *belief, const thermal_model_t *model,
                                   uint8_t spring, float changed2, float least2, float sds,
                                   float share);
+/* Less than that may have left the line as long as it likes, and is never suspected; relative. */
+float spring_unseen(const spring_departure_t *departure);
 /* Where it is on its way down, having lost so much of its phase. */
 float spring_lost_at_c(const thermal_model_t *model, uint8_t spring, float lost);
 typedef struct {

@@ -17,7 +17,6 @@
 #define OFFSET_LEAST_V 0.0005f /* what a turn's steps of 4 mV leave, and its noise */
 /* Of an average: so little phase may be lost unseen, and it tells anew in 2 x 16 turns. */
 #define LINE_VARIANCE (32.0f * LOSS_LEAST * LOSS_LEAST)
-#define STILL_K       0.5f /* below where it would be seen */
 
 /* In a frame of its own: inlined, avr-gcc 5.4 tears a pointer (test/board_code). */
 __attribute__((noinline)) static void see_crossing(spring_estimator_t *e, spring_belief_t *b,
@@ -132,7 +131,11 @@ static void follow(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *m
         tell_slope(line, left);
     }
     const float hotter_k = by_step_k(line, left, noise2);
-    line->ohm += line->ohm * (left - sure_rise_per_k(line) * hotter_k) * LINE_SHARE;
+    const bool may_lose =
+        spring_now_c(model, k) < spring_lost_at_c(model, k, b->lost) + CROSSING_SD_K;
+    if (!may_lose || spring_is_other_way(b, left)) {
+        line->ohm += line->ohm * (left - sure_rise_per_k(line) * hotter_k) * LINE_SHARE;
+    }
     line->way_k -= line->slow_k * LINE_SHARE;
     line->slow_k -= line->slow_k * LINE_SHARE;
     line->variance -= 2.0f * line->variance * LINE_SHARE;
@@ -295,8 +298,9 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         }
         if ((rests && b->current_a >= WEAK_A) || b->trial) { /* its average is of where it was */
             const float moved_since_k = fminf(line->way_k - line->slow_k, 0.0f);
+            const float unseen = spring_unseen(&d) / fabsf(b->learnt.change);
             spring_keep_above(e, b, model, k,
-                              spring_lost_at_c(model, k, b->lost) - STILL_K + moved_since_k);
+                              spring_lost_at_c(model, k, b->lost + unseen) + moved_since_k);
         }
         return;
     }

@@ -132,3 +132,8 @@ spring_departure_t spring_departs(spring_belief_t *b, const thermal_model_t *mod
     d.unsure = d.sure ? sqrtf(moves2) * (1.0f / SPRING_ESTIMATOR_BOUND_SDS) : 0.0f;
     return d;
 }
+
+float spring_unseen(const spring_departure_t *d)
+{
+    return fmaxf(d->least, SUSPECTED * SURE_SDS * sqrtf(d->noise2));
+}

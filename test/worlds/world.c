@@ -13,7 +13,7 @@
 /* Along the wire between the middles of two thirds: 18 W/mK (NiTi), 0.503 mm2, 36.7 mm. */
 #define AXIAL_W_PER_K 0.000247
 #define SHARE         (1.0 / WORLD_NODES)
-#define SOLVER_ROUNDS 40 /* as a rule three */
+#define SOLVER_ROUNDS 40   /* as a rule three */
 #define SOLVER_J      1e-8 /* 1e-7 K of a node */
 
 typedef struct {
