@@ -27,7 +27,7 @@ def austenite(temperature: np.ndarray, start_c: np.ndarray, finish_c: np.ndarray
 def loaded(path: Path, k_per_n: float, seed: int) -> Path:
     """Write a log of two springs that transform again and again, a load of 0 to 2 N on each at its own times; Euler, 0.5 s."""
     rng = np.random.default_rng(seed)
-    rows = 900
+    rows = 500
     current, load = np.zeros((rows, 2)), np.zeros((rows, 2))
     for k in range(2):
         at = int(rng.integers(5, 30))
@@ -48,7 +48,7 @@ def loaded(path: Path, k_per_n: float, seed: int) -> Path:
             low = np.full(2, -50.0) + ROOM_C
             high = np.full(2, 300.0)
             before = 0.3 * true + 8.0 * phase
-            for _ in range(30):
+            for _ in range(20):  # to a thousandth of the noise
                 middle = 0.5 * (low + high)
                 there = np.clip(
                     phase, austenite(middle, 88.0 + off, 98.0 + off), austenite(middle, 68.0 + off, 78.0 + off)
@@ -96,7 +96,7 @@ def test_a_load_is_found_sized_and_predicted(run: Run, tmp_path: Path) -> None:
 
 
 def test_a_load_that_moves_nothing_is_not_named(tmp_path: Path) -> None:
-    run = read_log(loaded(tmp_path / "log.csv", 0.0, 3), 2)
+    run = read_log(loaded(tmp_path / "log.csv", 0.0, 1), 2)
     assert diagnosis.diagnose(Array(1, 2), [run]).effects == ["latent_heat"]
 
 

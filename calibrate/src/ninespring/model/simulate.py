@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -197,8 +198,15 @@ class _Along:
 
 def load_changes(load_n: np.ndarray) -> np.ndarray:
     """Return the rows at which a load (rows, springs) has moved by LOAD_STEP_N since it was last laid on."""
-    out, laid = [], load_n[0]
-    for row, load in enumerate(load_n):
+    return _load_changes(np.ascontiguousarray(load_n, dtype=float).tobytes(), load_n.shape[1])
+
+
+@functools.lru_cache(maxsize=32)
+def _load_changes(load_n: bytes, springs: int) -> np.ndarray:
+    """Go along a load row by row: once of each log, which a diagnosis simulates thousands of times."""
+    rows = np.frombuffer(load_n).reshape(-1, springs)
+    out, laid = [], rows[0]
+    for row, load in enumerate(rows):
         if np.abs(load - laid).max() >= LOAD_STEP_N:
             out.append(row)
             laid = load
