@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ninespring.infer import budget
 from ninespring.io.logs import log_text
 from ninespring.model import native
 from plants import a_plant, columns_of, switched
@@ -72,6 +73,12 @@ def make_log(tmp_path: Path) -> Make:
 def make_shared_log(tmp_path_factory: pytest.TempPathFactory) -> Make:
     """Return a maker of logs from which something is made once for all tests of a file."""
     return _maker(tmp_path_factory.mktemp("shared"))
+
+
+@pytest.fixture
+def briefly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have searches end early: of a log of which something must be said, whatever else may be found in it after all."""
+    monkeypatch.setattr(budget, "ENOUGH", 1500)
 
 
 @pytest.fixture

@@ -173,7 +173,7 @@ def test_a_latent_heat_as_uncertain_as_large_is_not_written() -> None:
     assert made.kept["latent_heat_j"] == "the log says too little of it" and "austenite_finish_c" in made.written
 
 
-def test_a_spring_whose_thermometer_is_late_is_not_taken_for_one_of_twice_the_mass(make_log) -> None:
+def test_a_spring_whose_thermometer_is_late_is_not_taken_for_one_of_twice_the_mass(make_log, briefly: None) -> None:
     def late(columns: dict[str, np.ndarray]) -> None:
         time_s = np.arange(300.0)
         columns["t4_c"] = np.interp(time_s - 15.0, time_s, columns["t4_c"])
@@ -205,7 +205,7 @@ def test_what_rests_on_a_declared_resistance_is_said_and_not_written(make_log, t
     )
 
 
-def test_a_model_of_a_doubted_log_is_refused_and_written_only_by_force(make_log, tmp_path: Path) -> None:
+def test_a_model_of_a_doubted_log_is_refused_and_written_only_by_force(make_log, briefly: None, tmp_path: Path) -> None:
     def swap(columns: dict[str, np.ndarray]) -> None:
         columns["t1_c"], columns["t2_c"] = columns["t2_c"], columns["t1_c"]
 
@@ -221,7 +221,7 @@ def test_a_model_of_a_doubted_log_is_refused_and_written_only_by_force(make_log,
     assert "# doubted, written by --force: t2_c follows the drive of spring 1" in out.read_text()
 
 
-def test_a_log_that_the_model_misses_by_more_than_a_boards_margin_is_doubted(make_log) -> None:
+def test_a_log_that_the_model_misses_by_more_than_a_boards_margin_is_doubted(make_log, briefly: None) -> None:
     def sways(columns: dict[str, np.ndarray]) -> None:
         columns["t4_c"] = columns["t4_c"] + 9.0 * np.sin(np.arange(300.0) / 12.0)
 

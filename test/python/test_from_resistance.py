@@ -21,11 +21,14 @@ TRUE = {"heat_capacity_j_per_k": 0.34, "loss_w_per_k": 0.0052, "orthogonal_w_per
 
 
 def board_log(
-    path: Path, strongest_a: float = 2.1, effects: dict[str, dict[str, float]] | None = None, **more: np.ndarray | None
+    path: Path,
+    strongest_a: float = 2.1,
+    effects: dict[str, dict[str, float]] | None = None,
+    rows: int = 600,
+    **more: np.ndarray | None,
 ) -> Path:
     """Write what a board logs of an array that is not as declared, springs in turn and together; no temperature."""
     rng = np.random.default_rng(4)
-    rows = 900
     time_s, current = np.arange(float(rows)), np.full((rows, 9), 0.25)
     for k in range(9):
         for at in range(10 + 11 * k, rows, 150):
@@ -111,7 +114,7 @@ def test_a_board_alone_is_diagnosed_with_its_effect_and_no_degrees(
 
 
 def test_a_board_alone_tells_a_contact_that_got_worse(tmp_path: Path) -> None:
-    run = read_log(board_log(tmp_path / "board.csv"), or_resistance=True)
+    run = read_log(board_log(tmp_path / "board.csv", rows=900), or_resistance=True)
     assert run.current_a is not None and run.voltage_v is not None
     run.voltage_v[300:, 3] += 0.02 * run.current_a[300:, 3]
     run.drive[:, 3] = run.current_a[:, 3] * run.voltage_v[:, 3]

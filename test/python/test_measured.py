@@ -33,7 +33,9 @@ def test_six_camera_values_are_explained_by_one_number_and_rivals_have_experimen
     assert all("apart" in r["separating_experiment"] for r in result["rivals"])
 
 
-@pytest.mark.parametrize("file", ["energy_balance_600", "second_order_mimo_201"])
+@pytest.mark.parametrize(
+    "file", ["energy_balance_600", pytest.param("second_order_mimo_201", marks=pytest.mark.nightly)]
+)
 def test_the_laboratory_is_explained_far_better_than_by_the_textbook(measured: Path, tmp_path: Path, file: str) -> None:
     """Textbook, in sample: 1.26 and 1.23 K; with sensor lag and a fitted ambient 0.63 and 0.58."""
     path = tmp_path / "log.csv"

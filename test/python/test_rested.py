@@ -77,7 +77,9 @@ def test_a_room_and_an_alloy_that_only_show_together_are_found_from_where_the_sp
     assert any("springs read 3.0 K more than ambient_c" in text for text in found.told.warnings)
 
 
-def test_a_spring_that_is_still_warm_is_in_its_logged_room_and_that_it_rests_elsewhere_is_said(tmp_path: Path) -> None:
+def test_a_spring_that_is_still_warm_is_in_its_logged_room_and_that_it_rests_elsewhere_is_said(
+    briefly: None, tmp_path: Path
+) -> None:
     found = diagnosed(pulse(tmp_path / "pulse.csv", 1, logged_c=22.0, warm_k=2.0))
     assert RUN_AMBIENT not in names(found)
     assert any("springs read" in text and "K more than ambient_c" in text for text in found.told.warnings)

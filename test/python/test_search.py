@@ -231,8 +231,7 @@ def test_what_took_a_place_and_did_not_stay_there_gives_it_back() -> None:
     assert found == (one, {"one": bare}, [("one", other)])
 
 
-@pytest.mark.parametrize("beyond", [0.0, 1.0])
-@pytest.mark.parametrize("width", [0.1, 0.9])
+@pytest.mark.parametrize(("beyond", "width"), [(0.0, 0.9), (1.0, 0.1)])
 def test_a_camera_that_sees_the_surroundings_beyond_the_array_makes_no_edge_loss(
     make_log, beyond: float, width: float
 ) -> None:
@@ -574,7 +573,7 @@ def test_a_drift_of_these_runs_is_said_and_left_out_of_the_model(make_log, tmp_p
     assert ("nearer to the springs" in said) == (run.ambient_c is not None)
 
 
-def test_a_run_that_does_not_begin_as_logged_is_said(make_log) -> None:
+def test_a_run_that_does_not_begin_as_logged_is_said(make_log, briefly: None) -> None:
     def late(columns: dict[str, np.ndarray]) -> None:
         for k in range(1, 10):
             columns[f"t{k}_c"] = columns[f"t{k}_c"] + 6.0 * np.exp(-((np.arange(450.0) - 30) ** 2) / 200)
