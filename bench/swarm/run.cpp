@@ -460,6 +460,8 @@ private:
         case kind::ripple:
             blind_.fill(true);
             break;
+        case kind::creeps:
+        case kind::volt_drifts:
         case kind::volt_scaled:
         case kind::stuck_bit:
         case kind::drifts:

@@ -170,6 +170,8 @@ double amount(dice &d, kind what, unsigned channel)
         return d.uniform(0.3, 2.0);
     case kind::stuck_bit:
         return either_way(d, 1.0 + d.below(32));
+    case kind::creeps:
+    case kind::volt_drifts:
     case kind::drifts:
         return either_way(d, logarithmic(d, 0.01, 1.0));
     case kind::saturates:
@@ -299,9 +301,21 @@ void fault(dice &d, scenario &s)
     case kind::hang:
         s.events.push_back(one);
         break;
-    default:
+    case kind::open:
+    case kind::shorted:
+    case kind::closed:
+    case kind::absent:
+    case kind::stale:
+    case kind::sda:
+    case kind::worn:
+    case kind::enable_low:
+    case kind::enable_high:
+    case kind::fan_stops:
+    case kind::diode_open:
         last(d, s, one);
         break;
+    default: /* of size 0 it would be none */
+        throw std::logic_error(std::string(name_of(what)) + ": nobody draws how much of it");
     }
 }
 

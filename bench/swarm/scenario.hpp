@@ -54,7 +54,7 @@ enum class kind {
     clock,         /* value: the world's seconds in one of the board's */
     gates_swapped, /* channel, value: another one */
     thermistor,    /* value V */
-    /* sensors that answer (lie); the first two by bench_faults alone: no seed draws them */
+    /* sensors that answer (lie) */
     creeps,      /* channel, value A a minute */
     volt_drifts, /* channel, value share a minute */
     volt_scaled, /* channel, value: it shows so many times the voltage */
