@@ -48,7 +48,9 @@ def test_swapped_columns_are_named_through_a_phase_change_and_warm_air(make_log,
         }
 
 
-def test_of_a_log_with_swapped_columns_the_mistake_is_said_first_and_nothing_else_is_made_of_it(make_log) -> None:
+def test_of_a_log_with_swapped_columns_the_mistake_is_said_first_and_nothing_else_is_made_of_it(
+    make_log, briefly: None
+) -> None:
     def swap(columns: dict[str, np.ndarray]) -> None:
         pairs = {1: 2, 2: 1, 4: 9, 9: 4}
         columns.update({f"t{k}_c": v for k, v in [(k, columns[f"t{o}_c"]) for k, o in pairs.items()]})

@@ -118,7 +118,7 @@ def test_numbers_are_of_one_kind_in_every_file(tmp_path: Path) -> None:
 
 
 def test_lost_workers_lose_nothing(tmp_path: Path, client: Any) -> None:
-    text = GRID.replace(SHORT, "duration_s = 600\non_s = 400\n").replace("steps = 3", "steps = 12")
+    text = GRID.replace(SHORT, "duration_s = 240\non_s = 160\n").replace("steps = 3", "steps = 12")
     spec = spec_of(tmp_path, text)
     calm = swept(client, spec, tmp_path / "calm")
     results = Results(tmp_path / "out", spec)
