@@ -264,6 +264,15 @@ def test_what_was_not_measured_is_empty_or_nan(tmp_path: Path, cell: str) -> Non
     assert np.flatnonzero(np.isnan(run.temperature_c[:, 0])).tolist() == [7]
 
 
+def test_a_spring_that_was_not_switched_on_yet_is_not_saturated(tmp_path: Path) -> None:
+    """Of a simulation, without noise: in the row in which it is switched on a spring is as warm as before."""
+    since = np.arange(400) - 40
+    shown = 20.5 + 30.0 * (1.0 - np.exp(-np.clip(since, 0, None) / 50.0))
+    rows = "".join(f"{k},{s >= 0:d},{t:.6f}\n" for k, (s, t) in enumerate(zip(since, shown, strict=True)))
+    run = read(tmp_path, HEADER + rows)
+    assert np.isfinite(run.temperature_c).all(), run.notes
+
+
 @pytest.mark.parametrize("hotter", [False, True])
 def test_a_spring_that_has_settled_is_neither_frozen_nor_saturated(tmp_path: Path, hotter: bool) -> None:
     """Its thermometer steps by half a kelvin, and what measures its current is noisy."""

@@ -168,11 +168,16 @@ def mask_bad_sensors(run: Run) -> None:
         for edge, extreme in (("highest", measured.max()), ("lowest", measured.min())):
             at = int(np.argmax(np.where(measured[begins] == extreme, lengths, 0)))
             begin, longest, inner = int(begins[at]), int(lengths[at]), measured[measured != extreme]
-            switched = _switches(run, k, seen[begin : begin + longest]).size > 0
-            others = _stands(inner)[1].max(initial=0)
+            elsewhere = int(_stands(inner)[1].max(initial=0))
+            switched = _switches(run, k, seen[begin : begin + longest - elsewhere]).size > 0
             # Ordinary quantisation also repeats values; a clipped sensor stays at ITS extreme far longer
             # than it ever stays at any other value.
-            if inner.size >= 10 and longest >= 15 and longest > 4 * others and _is_stopped(measured, begin, switched):
+            if (
+                inner.size >= 10
+                and longest >= 15
+                and longest > 4 * elsewhere
+                and _is_stopped(measured, begin, switched)
+            ):
                 # near the limit only what the noise carried down is seen: those rows would pull the fit
                 run.temperature_c[seen[np.abs(measured - extreme) <= 4.0 * noise[k]], k] = np.nan
                 run.notes.append(
@@ -184,7 +189,7 @@ def mask_bad_sensors(run: Run) -> None:
 
 def _is_stopped(measured: np.ndarray, begin: int, switched: bool) -> bool:
     """Return whether something stopped a sensor where it begins to stay at an extreme: it was on its way there, or its spring's drive changes
-    meanwhile. A spring that has settled stays where it is, too."""
+    meanwhile, and it stays for longer than it ever does elsewhere. A spring that has settled stays where it is, too."""
     moves = np.abs(np.diff(measured))
     step = float(moves[moves > 0].min(initial=np.inf))
     return switched or (begin > 0 and float(np.ptp(measured[max(0, begin - STOPPED_ROWS) : begin])) > 3.0 * step)
