@@ -11,8 +11,11 @@ import pytest
 from ninespring.find import diagnosis, doubt, plausibility, resistance
 from ninespring.io import results, statistics
 from ninespring.io.logs import condense, read_log, write_atomically
+from ninespring.io.logs.run import Run
+from ninespring.model import native
 from ninespring.model.models import Array, model_text, read_model
 from ninespring.say import page
+from plants import a_plant
 
 TRUE = {"latent_heat": {"latent_heat_j": 8.0}, "shared_air": {"air_exchange_w_per_k": 0.2}}
 
@@ -46,6 +49,20 @@ def test_swapped_columns_are_named_through_a_phase_change_and_warm_air(make_log,
         assert {text.split(",")[0] for text in found} == {
             f"t{k}_c follows the drive of spring {o}" for k, o in pairs.items()
         }
+
+
+def test_a_drive_moves_its_spring_as_much_in_a_log_that_was_averaged() -> None:
+    """Rows of a second after each switch, and of a minute later: what they weigh is the time that they last."""
+    rng, time_s = np.random.default_rng(8), np.arange(4500.0)
+    drive = np.repeat(rng.choice([0.0, 0.2, 0.45], (15, 4)), 300, axis=0)
+    shown = a_plant((2, 2)).simulate(time_s, native.POWER, drive, np.zeros(4500), np.full(4500, 20.0))
+    shown = shown + rng.normal(0.0, 0.1, shown.shape)
+    whole = Run("whole", "", time_s, "power", drive, shown, np.zeros(4500), np.full(4500, 20.0))
+    short = condense(whole, 700)
+    assert np.ptp(np.diff(short.time_s)) > 5.0
+    assert np.diag(plausibility.own_drive([short])) == pytest.approx(np.diag(plausibility.own_drive([whole])), rel=0.25)
+    crossed = replace(short, temperature_c=short.temperature_c[:, [1, 0, 2, 3]])
+    assert len(plausibility.swapped([crossed])) == 2 and not plausibility.swapped([short])
 
 
 def test_of_a_log_with_swapped_columns_the_mistake_is_said_first_and_nothing_else_is_made_of_it(

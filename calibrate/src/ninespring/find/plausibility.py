@@ -19,6 +19,8 @@ from ..io import statistics
 from ..io.logs.run import Run
 from .evidence import UNEXPLAINED
 
+STRETCH_S = 10.0
+"""In which a drive shows beside the noise."""
 OWN_DRIVE_SHARE = 0.5
 """Standardised coefficient (1 about: the drive alone moves the spring) from which a drive is a spring's own."""
 ON_A_STEP = 0.01
@@ -34,18 +36,23 @@ HOTTER_C = 5.0
 def own_drive(runs: Sequence[Run]) -> np.ndarray:
     """Return how strongly each drive (row) moves each temperature (column), (springs, springs).
 
-    Standardised coefficients of a regression of the rise over 10 s on all drives at once and on the spring's own
-    temperature: what a neighbour does is not taken for the spring's own drive. Zero where the data say nothing.
+    Standardised coefficients of a regression of the rise from each stretch of 10 s, or longer row, to the next on the mean drives
+    between their middles and on the spring's own temperature: what a neighbour does is not taken for the spring's own drive. Zero
+    where the data say nothing.
     """
     springs = runs[0].springs
     total, weight = np.zeros((springs, springs)), np.zeros(springs)
     for run in runs:
-        width = max(1, round(10.0 / float(np.median(np.diff(run.time_s)))))
         heat = run.drive**2 if run.mode == "current" else run.drive
-        mean, _, begins = statistics.block_means(run.temperature_c, width)
-        power = np.add.reduceat(heat, begins, axis=0) / width
-        power = 0.5 * (power[1:] + power[:-1])
-        rise = np.diff(mean, axis=0)
+        given = np.cumsum(heat[:-1] * np.diff(run.time_s)[:, None], axis=0)
+        given = np.vstack([np.zeros((1, springs)), given])
+        begins = np.flatnonzero(np.diff((run.time_s - run.time_s[0]) // STRETCH_S, prepend=-1.0))
+        middle = np.add.reduceat(run.time_s, begins) / np.diff(begins, append=len(run.time_s))
+        pieces = np.split(run.temperature_c, begins[1:])
+        mean = np.array([statistics.mean_there(piece, 0) for piece in pieces])
+        lasts_s = np.diff(middle)[:, None]
+        power = np.diff(np.column_stack([np.interp(middle, run.time_s, one) for one in given.T]), axis=0) / lasts_s
+        rise = np.diff(mean, axis=0) / lasts_s
         for k in range(springs):
             good = np.isfinite(rise[:, k])
             if good.sum() < 3 * springs or np.std(rise[good, k]) < 1e-9:
