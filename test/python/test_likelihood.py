@@ -85,6 +85,16 @@ def test_evidence_counts_a_reading_for_what_it_is_worth() -> None:
     assert np.median(gained) < 4.0
 
 
+def test_what_is_finer_than_the_least_noise_is_no_evidence() -> None:
+    """What a model leaves of an exact log is smooth, and small: half of it is nothing worth."""
+    walk = Rows.of(np.arange(900.0), [0], np.ones((900, 2), dtype=bool))
+    left = 0.05 * np.sin(np.arange(1800.0) / 130.0)
+    exact, bounded = ([fitted([walk], [part * left], least)[1] for part in (0.5, 1.0)] for least in (0.0, 1.0))
+    assert exact[0] - exact[1] > 500.0
+    assert abs(bounded[0] - bounded[1]) < 3.0
+    assert fitted([walk], [left], 1.0)[0].white == 1.0
+
+
 def test_steps_of_a_thermometer_are_its_noise() -> None:
     slow = 20.0 + 30.0 * (1.0 - np.exp(-np.arange(900.0) / 200.0))
     stepped = (np.round(slow / 0.32) * 0.32)[:, None]

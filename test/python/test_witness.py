@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ninespring.find import certainty, contacts, diagnosis, evidence, residual, resistance, unknown_heat
-from ninespring.find.readings import Readings, readings
+from ninespring.find.readings import Readings, nats_of, readings, solve
 from ninespring.infer.declared import base_spec
 from ninespring.infer.fit import Fit
 from ninespring.infer.problem import Problem
@@ -347,3 +347,13 @@ def test_what_is_far_below_a_finding_is_not_taken_apart(monkeypatch: pytest.Monk
     steps, _ = contacts.find(read, columns)
     assert [round(one.ohm, 3) for one in steps] == [0.006]
     assert abs(steps[0].from_s - 901.0) < 40.0
+
+
+def test_what_is_finer_than_voltages_step_is_no_evidence() -> None:
+    """A simulation's exact v / i that moves by a hundred-thousandth with heat, beside what a reading is known to."""
+    over_k, nothing = np.linspace(0.0, 60.0, 500), np.zeros(500)
+    for rise, told in ((1e-8, False), (1e-4, True)):
+        ohm = 0.2 + rise * over_k
+        read = Readings(ohm, nothing, nothing, np.arange(500.0), nothing, over_k, np.full(500, 8e-4), nothing < 1.0)
+        own = {"own 0": np.ones(500)}
+        assert (nats_of(read, solve(read, own), solve(read, own | {"rise martensite": over_k})) > 0.0) == told

@@ -50,7 +50,7 @@ def likelihood(problem: Problem, fit: Fit) -> float:
     """Return the logarithm of a fit's likelihood, errors that last fitted beside the white noise (infer/likelihood.py)."""
     if not math.isfinite(fit.nats):
         left = problem.scaled(problem.without_errors(fit.residual))
-        fit.colour, fit.nats = fitted(problem.rows, left)
+        fit.colour, fit.nats = fitted(problem.rows, left, problem.least)
     return fit.nats
 
 

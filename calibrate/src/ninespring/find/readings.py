@@ -176,9 +176,10 @@ def solve(read: Readings, columns: dict[str, np.ndarray]) -> Linear:
 
 
 def nats_of(read: Readings, less: Linear, more: Linear) -> float:
-    """Return by how much the larger model is likelier: half the difference of BIC, correlated rows counted for less."""
+    """Return by how much the larger model is likelier, each with its numbers paid for (BIC): by noise that is no less than what is
+    known of the readings, correlated rows counted for less."""
     rest = more.rest
     rho = float(rest[1:] @ rest[:-1] / max(1e-12, rest @ rest))
-    n = len(rest) * max(0.02, (1.0 - max(0.0, rho)) / (1.0 + max(0.0, rho)))
-    gained = 0.5 * n * math.log(max(less.chi2, 1e-9) / max(more.chi2, 1e-9))
-    return gained - 0.5 * (len(more.values) - len(less.values)) * math.log(max(2.0, n))
+    alike = max(0.02, (1.0 - max(0.0, rho)) / (1.0 + max(0.0, rho)))
+    gained = statistics.surprise(less.chi2, len(rest), 1.0) - statistics.surprise(more.chi2, len(rest), 1.0)
+    return alike * gained - 0.5 * (len(more.values) - len(less.values)) * math.log(max(2.0, alike * len(rest)))

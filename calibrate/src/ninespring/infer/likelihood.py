@@ -9,13 +9,13 @@ difference of two of them is what the data say for one model against another, an
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize
 
+from ..io import statistics
 from ..model import native
 
 BROKEN = 1e12
@@ -160,8 +160,9 @@ class _Walk:
 class Weighed:
     """What a model leaves, as its likelihood weighs it: the runs' fields (rows, columns), of what is not their mean and of means."""
 
-    def __init__(self, rows: Sequence[Rows], vectors: Sequence[np.ndarray]) -> None:
+    def __init__(self, rows: Sequence[Rows], vectors: Sequence[np.ndarray], least: float = 0.0) -> None:
         self.count = sum(one.count for one in rows)
+        self.least = least
         self.together = any(one.turn is not None for one in rows)
         pieces: tuple[dict[int, list[tuple[np.ndarray, bytes, np.ndarray]]], ...] = ({}, {})
         for one, vector in zip(rows, vectors, strict=True):
@@ -186,7 +187,7 @@ class Weighed:
 
     def loss(self, squares: float, logarithms: float) -> float:
         """Return the negative logarithm of the likelihood, white noise as large as fits, but for a constant."""
-        return 0.5 * self.count * math.log(max(squares, 1e-300) / self.count) + logarithms
+        return statistics.surprise(squares, self.count, self.least) + logarithms
 
     def at(self, z: np.ndarray) -> tuple[float, np.ndarray, float]:
         """Return the loss at logarithms of variances (own quick, slow, mean's quick, slow) and time constants, its slopes,
@@ -195,7 +196,10 @@ class Weighed:
         own, mean = self.of(0, size[:2], size[4:]), self.of(1, size[2:4], size[4:])
         both = own + mean
         slope = np.concatenate(
-            [0.5 * self.count / max(both[0], 1e-300) * one[2:6] + one[6:] for one in (own, mean, both)]
+            [
+                0.5 / statistics.variance(both[0], self.count, self.least) * one[2:6] + one[6:]
+                for one in (own, mean, both)
+            ]
         )
         return self.loss(both[0], both[1]), slope[[0, 1, 4, 5, 10, 11]], float(both[0])
 
@@ -220,9 +224,10 @@ class Weighed:
         return out
 
 
-def fitted(rows: Sequence[Rows], vectors: Sequence[np.ndarray]) -> tuple[Colour, float]:
-    """Return how errors last by what a model leaves, per run in units of the noise, and the logarithm of its likelihood."""
-    weighed = Weighed(rows, vectors)
+def fitted(rows: Sequence[Rows], vectors: Sequence[np.ndarray], least: float = 0.0) -> tuple[Colour, float]:
+    """Return how errors last by what a model leaves, per run in units of the noise, and the logarithm of its likelihood: by white
+    noise of `least` variance or more."""
+    weighed = Weighed(rows, vectors, least)
     low = np.log([NONE, NONE, NONE, NONE, QUICK_S[0], SLOW_S[0]])
     high = np.log([LARGEST, LARGEST, LARGEST, LARGEST, QUICK_S[1], SLOW_S[1]])
     free = np.array([0, 1, 2, 3, 4, 5] if weighed.together else [0, 1, 4, 5])
@@ -261,5 +266,5 @@ def fitted(rows: Sequence[Rows], vectors: Sequence[np.ndarray]) -> tuple[Colour,
     size = [float(one) for one in np.exp(whole)]
     if not weighed.together:
         size[2:4] = [NONE, NONE]
-    colour = Colour((size[0], size[1]), (size[2], size[3]), (size[4], size[5]), squares / weighed.count)
-    return colour, -value - 0.5 * weighed.count
+    white = statistics.variance(squares, weighed.count, least)
+    return Colour((size[0], size[1]), (size[2], size[3]), (size[4], size[5]), white), -value

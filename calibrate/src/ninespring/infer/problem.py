@@ -36,6 +36,11 @@ _BAD = 1e3
 """What a simulation that the plant refuses 'shows', degC: so far off that no fit goes there."""
 
 
+FINEST_C = 0.005
+"""What any reading is right to, at best."""
+RIGHT_TO = 1e-3
+"""Part of a spring's rise that a model is right to, at best: heat is logged with three digits, and the laws of lumps are no better.
+What is finer is no evidence, however fine thermometers are."""
 FOLDS = 5
 BLOCK_S = 150.0
 """Length of a held-out block: longer than the residual remembers, shorter than a drift of the ambient."""
@@ -86,6 +91,8 @@ class Problem:
             statistics.rounding(run.temperature_c, run.starts) if run.rounding_c is None else run.rounding_c
             for run in self.runs
         ]
+        self.right_to = [np.maximum(FINEST_C, RIGHT_TO * statistics.rises(run.temperature_c)) for run in self.runs]
+        """What a model is right to at best in each run, (springs,), degC."""
         self._tidy_noise()
         self.colour: Colour | None = None
         self._rows: list[Rows] | None = None
@@ -120,15 +127,20 @@ class Problem:
         return max(float(np.nanmax(run.temperature_c)) for run in self.runs)
 
     def _tidy_noise(self) -> None:
-        """A column too short or too clean to estimate takes the median of the others; 0.005 degC, and what its steps leave, at least."""
+        """A column too short or too clean to estimate takes the median of the others; what its steps leave, and what a model is right
+        to, at least."""
         everything = np.concatenate(self.noise)
         usable = everything[np.isfinite(everything) & (everything > 0)]
         usual = float(np.median(usable)) if usable.size else 0.05
-        least = max(0.005, 0.2 * usual)
         self.noise = [
-            np.maximum(np.maximum(np.where(np.isfinite(one), one, usual), least), steps)
-            for one, steps in zip(self.noise, self.rounding, strict=True)
+            np.maximum(np.maximum(np.where(np.isfinite(one), one, usual), np.maximum(right, 0.2 * usual)), steps)
+            for one, steps, right in zip(self.noise, self.rounding, self.right_to, strict=True)
         ]
+
+    @property
+    def least(self) -> float:
+        """Variance, in units of the noise's, of what no model explains: the least that is white in what one leaves."""
+        return float(np.mean(self.of_samples([(a / b) ** 2 for a, b in zip(self.right_to, self.noise, strict=True)])))
 
     @property
     def noise_c(self) -> float:
@@ -406,9 +418,11 @@ class Problem:
                 self.basis[r] = u * np.sqrt(1.0 - 1.0 / np.sqrt(1.0 + size**2))
 
     def learn_power(self, spec: Spec, values: Values) -> None:
-        """Find what rounding of the board's voltages leaves in each run: to keep it out of what is judged."""
+        """Find what rounding of the voltages leaves in each run: to keep it out of what is judged."""
+        plant = self.plant_for(spec, values)
+        holds, loses = plant.get("heat_capacity_j_per_k"), plant.get("loss_w_per_k")
         for r, run in enumerate(self.runs):
-            if errors := power_errors(run):
+            if errors := power_errors(run, holds, loses, self.noise[r]):
                 base, *shown = self.each(
                     lambda job: self.simulate(spec, values, *job), [(r, None, more) for more in (None, *errors)]
                 )
@@ -417,7 +431,7 @@ class Problem:
                 )
 
     def without_errors(self, residual: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Return residuals less what errors of the first readings and of the board's voltages leave in them.
+        """Return residuals less what errors of the first readings and of rounded voltages leave in them.
 
         They are estimated with the noise, or what rounding leaves, as their spread and cut at 3 of the noise and at half a
         step: what is further off is structure like any other.

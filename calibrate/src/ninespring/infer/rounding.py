@@ -1,4 +1,4 @@
-"""What a board's voltages are off by: they step, and where nothing changes the error stays what it is."""
+"""What logged voltages are off by: they step, and where nothing changes the error stays what it is."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ import math
 
 import numpy as np
 
+from ..io.logs.log import BOARD_STEP_V
 from ..io.logs.run import Run
 
 DRIVEN_A = 0.2
 """Currents from which v / i is a measurement of resistance, not of the sensor's offset."""
-STEP_V = 4e-3
-"""Of the board's sensors."""
-ROUNDING_V = STEP_V / math.sqrt(12.0)
+ROUNDING_V = BOARD_STEP_V / math.sqrt(12.0)
 """What rounding leaves in a voltage of the board, rms: where the current is steady so is the error."""
 MOST = 300
 """So many errors of a run are followed, the largest: each is a simulation."""
+SHOWS = 0.1
+"""Of the noise: an error of the power that moves no reading by more is not followed."""
 
 
 def steady(run: Run) -> np.ndarray:
@@ -32,10 +33,10 @@ def steady(run: Run) -> np.ndarray:
     return driven & (run.voltage_v * share**2 < ROUNDING_V)
 
 
-def power_errors(run: Run) -> list[np.ndarray]:
-    """Return what rounding of the board's voltages makes of the power, one sigma of it each time that a current stays the
-    same: (rows, springs), W. None where the power is not of a board's sensors."""
-    if not run.of_board or run.current_a is None or run.voltage_v is None:
+def power_errors(run: Run, heat_capacity_j_per_k: float, loss_w_per_k: float, noise_c: np.ndarray) -> list[np.ndarray]:
+    """Return what rounding of the voltages makes of the power, one sigma of it each time that a current stays the same: (rows, springs),
+    W; of those that could show beside the thermometers' noise (springs,) in springs that hold and lose so much."""
+    if run.step_v == 0.0 or run.current_a is None or run.voltage_v is None:
         return []
     out = []
     here = steady(run)
@@ -43,6 +44,9 @@ def power_errors(run: Run) -> list[np.ndarray]:
         bounds = np.flatnonzero(np.diff(here[:, k], prepend=False, append=False))
         for begin, end in zip(bounds[::2], bounds[1::2], strict=True):
             one = np.zeros(run.drive.shape)
-            one[begin:end, k] = ROUNDING_V * run.current_a[begin:end, k]
-            out.append(one)
+            one[begin:end, k] = run.step_v / math.sqrt(12.0) * run.current_a[begin:end, k]
+            lasts_s = run.time_s[min(end, len(run.time_s) - 1)] - run.time_s[begin]
+            moves_k = one[:, k].max() * min(lasts_s / heat_capacity_j_per_k, 1.0 / loss_w_per_k)
+            if moves_k > SHOWS * noise_c[k]:
+                out.append(one)
     return sorted(out, key=lambda one: -float(one.sum()))[:MOST]

@@ -6,6 +6,7 @@ Nothing here knows what a spring is.
 from __future__ import annotations
 
 import itertools
+import math
 import warnings
 from collections.abc import Sequence
 
@@ -63,6 +64,14 @@ def rounding(series: np.ndarray, starts: Sequence[int] = (0,)) -> np.ndarray:
         if moved.size and (moved == 0.0).mean() >= STANDS and (moved > 0.0).any():
             out[k] = np.quantile(moved[moved > 0.0], 0.1) / np.sqrt(12.0)
     return np.where(out > noise, out, 0.0)
+
+
+def last_digit(values: np.ndarray | None) -> float:
+    """Return the last decimal place in which numbers were written, as a step; 0 where that is beyond the sixth, or there are none."""
+    for step in () if values is None else (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
+        if np.all(np.abs(values - step * np.round(values / step)) < 1e-9):
+            return step
+    return 0.0
 
 
 def shared_noise(series: np.ndarray, starts: Sequence[int] = (0,)) -> np.ndarray:
@@ -128,6 +137,22 @@ def correlation_factor(series: Sequence[np.ndarray], lags: int) -> float:
             break
         total += 2.0 * pair
     return max(1.0, total)
+
+
+def rises(series: np.ndarray) -> np.ndarray:
+    """Return how far each column is above the lowest value of all, rms; 0 where nothing is there."""
+    return np.sqrt(np.nan_to_num(mean_there((series - np.nanmin(series, initial=np.inf)) ** 2, 0)))
+
+
+def variance(squares: float, count: int, least: float) -> float:
+    """Return the likeliest variance of white noise by a sum of squares: `least` or more."""
+    return max(squares / max(1, count), least, 1e-300)
+
+
+def surprise(squares: float, count: int, least: float) -> float:
+    """Return the negative logarithm of the likelihood of white noise as large as fits, `least` variance or more, but for a constant."""
+    size = variance(squares, count, least)
+    return 0.5 * (count * math.log(size) + squares / size)
 
 
 def block_means(series: np.ndarray, width: int, starts: Sequence[int] = (0,)) -> tuple:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..ranges import LOG_TIME_S
-from ..statistics import rounding
+from ..statistics import last_digit, rounding
 from . import mending
 from .run import SENSORS, DriveMode, Run
 from .table import Table
@@ -154,6 +154,8 @@ def _layers(table: Table, springs: int) -> int:
     return int(given)
 
 
+BOARD_STEP_V = 4e-3
+"""Of a board's voltages."""
 CUT_SHORT = "a fault cut this run short"
 """So begins what is said first of a log whose springs a fault switched off."""
 
@@ -276,5 +278,5 @@ def _run_of(table: Table, frame: pd.DataFrame, letter: str, count: int, has_volt
         load_n=load,
         notes=notes,
         sensor=next((one for one in SENSORS if one == table.keys.get("sensor")), ""),
-        of_board=table.keys.get("version", "").startswith("ninespring "),
+        step_v=BOARD_STEP_V if table.keys.get("version", "").startswith("ninespring ") else last_digit(voltage),
     )

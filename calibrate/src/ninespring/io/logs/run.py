@@ -42,8 +42,8 @@ class Run:
     notes: list[str] = field(default_factory=list)
     sensor: str = ""
     """One of SENSORS, where the log says which."""
-    of_board: bool = False
-    """Currents and voltages are a board's: its voltages step."""
+    step_v: float = 0.0
+    """By which voltages step, V: a board's sensors, or the last digit that was written; 0: by nothing that counts."""
     warm: bool = False
     """The run begins warm and steady: hidden heat is in balance with the first inputs."""
     around_share: float = 1.0
