@@ -100,6 +100,26 @@ def test_it_is_found_where_it_steps_and_before_noise_that_lasts(tmp_path: Path, 
     assert np.isfinite(less.temperature_c[:, 0]).all() and np.isfinite(runs[1].temperature_c).all()
 
 
+def test_heat_that_bends_is_no_step_however_fine_the_thermometer() -> None:
+    """What another law of a phase change leaves for half a minute, and as large a jump."""
+    time_s, noise = 2.0 * np.arange(200.0), np.random.default_rng(7).normal(0.0, 0.04, (200, 1))
+    window = ((time_s >= 130.0) & (time_s < 170.0))[:, None].astype(float)
+    problem: Any = SimpleNamespace(
+        runs=[SimpleNamespace(time_s=time_s)],
+        mask=[np.ones((200, 1), dtype=bool)],
+        noise=[np.array([0.04])],
+        least=1.0,
+        evaluate=lambda fit: fit,
+        without_errors=lambda residual: residual,
+    )
+    one = loose.Loose(0, 0, "sensor", (65, 85), window, (130.0, 170.0), (130.0, 170.0))
+    nats = []
+    for shape in (np.exp(-(((time_s - 150.0) / 20.0) ** 2))[:, None], window):
+        fit: Any = SimpleNamespace(residual=[shape + noise])
+        nats.append(loose._nats_of_steps(problem, fit, one))
+    assert nats[0] < 3.0 and nats[1] > 30.0
+
+
 def test_a_drive_that_changes_is_no_thermometer(tmp_path: Path) -> None:
     runs = [two_springs(tmp_path / f"{n}.csv", n, drive=drive, holder_w_per_k=0.0) for n, drive in ((1, 1.0), (2, 0.5))]
     assert loose.find(*fitted(runs)) is None

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..infer.fit import Fit
+from ..infer.likelihood import Rows, fitted
 from ..infer.problem import Problem
 from ..io import results
 from ..io.logs.run import Run
@@ -245,7 +246,8 @@ def _at_its_step(problem: Problem, fit: Fit, window: Hidden) -> Loose:
 
 
 def _nats_of_steps(problem: Problem, fit: Fit, one: Loose) -> float:
-    """Return the nats by which a window's ends show it by themselves: beside what stays or goes on evenly in the rows around each."""
+    """Return the nats by which a window's ends show it by themselves: beside what stays or goes on evenly in the rows around each, and
+    lasts. What bends there is heat's, however little it is beside the noise."""
     run, mask, k = problem.runs[one.run], problem.mask[one.run], one.spring
     left = problem.without_errors(problem.evaluate(fit).residual)[one.run][:, k] / problem.noise[one.run][k]
     nats = 0.0
@@ -256,11 +258,16 @@ def _nats_of_steps(problem: Problem, fit: Fit, one: Loose) -> float:
             continue
         since_s = (run.time_s[rows] - run.time_s[row])[there]
         columns = np.column_stack([np.ones(len(since_s)), since_s, one.profile[rows, k][there]])
+        around = Rows.of(run.time_s[rows], [0], mask[rows, k : k + 1])
         even, step = (
-            float(np.sum((left[rows][there] - part @ np.linalg.lstsq(part, left[rows][there], rcond=None)[0]) ** 2))
+            fitted(
+                [around],
+                [left[rows][there] - part @ np.linalg.lstsq(part, left[rows][there], rcond=None)[0]],
+                problem.least,
+            )[1]
             for part in (columns[:, :2], columns)
         )
-        nats += 0.5 * (even - step) / max(1.0, step / len(since_s))
+        nats += step - even
     return nats
 
 
