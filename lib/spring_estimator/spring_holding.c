@@ -131,11 +131,7 @@ static void follow(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *m
         tell_slope(line, left);
     }
     const float hotter_k = by_step_k(line, left, noise2);
-    const bool may_lose =
-        spring_now_c(model, k) < spring_lost_at_c(model, k, b->lost) + CROSSING_SD_K;
-    if (!may_lose || spring_is_other_way(b, left)) {
-        line->ohm += line->ohm * (left - sure_rise_per_k(line) * hotter_k) * LINE_SHARE;
-    }
+    line->ohm += line->ohm * (left - sure_rise_per_k(line) * hotter_k) * LINE_SHARE;
     line->way_k -= line->slow_k * LINE_SHARE;
     line->slow_k -= line->slow_k * LINE_SHARE;
     line->variance -= 2.0f * line->variance * LINE_SHARE;

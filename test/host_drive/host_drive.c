@@ -175,7 +175,7 @@ TEST(search_costs_a_declared_array_no_more_than_a_fiftieth)
 
 /* A cloth on the display in mid-hold: what all springs lose falls to a third or to less than a
  * half, and it is lifted again. Each believed alone, they end between 130 and 330 degC; so, over
- * eight seeds of noise, at 109 to 124. Corners may not come back at once (a fifth of all springs
+ * eight seeds of noise, at 109 to 129. Corners may not come back at once (a fifth of all springs
  * from a third of the loss, a tenth from the other, over the same): that is said. */
 TEST(cloth_that_lies_on_the_display_is_noticed)
 {
@@ -581,15 +581,15 @@ static double hottest_of_everything(uint32_t seed)
     return hottest_c;
 }
 
-/* Of five draws, each more than an hour long: most below 120 degC (over sixteen: all but two, 126
- * and 138), none far above. Thousands, shorter and with faults: bench_swarm, test/worlds. */
+/* Of five draws, each more than an hour long: most below 120 degC, none far above. Thousands,
+ * shorter and with faults: bench_swarm, test/worlds. */
 TEST(everything_at_once_stays_within_the_limits)
 {
     unsigned hot = 0;
     for (uint32_t seed = 11; seed < 16; seed++) {
         const double hottest_c = hottest_of_everything(seed);
         here("draw %u: %.1f degC", (unsigned)seed, hottest_c);
-        TEST_ASSERT_TRUE(hottest_c < 140.0);
+        TEST_ASSERT_TRUE(hottest_c < 135.0);
         hot += hottest_c > 120.0;
     }
     TEST_ASSERT_LESS_OR_EQUAL_UINT(2, hot);
