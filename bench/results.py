@@ -70,13 +70,13 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "swarm",
         "Worlds that nobody listed: everything drawn at once",
-        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2921",
+        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2922",
         markdown=True,
     ),
     Section(
         "swarm_knows",
         "The same, driven by whoever knows all that is true",
-        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2921 --knows",
+        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2918 --knows",
         markdown=True,
     ),
     Section(
