@@ -145,6 +145,7 @@ def test_the_report_shows_rivals_what_is_unexplained_and_what_is_not_determined(
         at_bounds=["sensor_lag_s"],
         correlated=[results.Correlation(a="loss_w_per_k", b="sensor_lag_s", correlation=0.99)],
     )
+    assert "Heat of unknown origin" not in Page(report.html_report(changed)).headings, "there is none"
     watts = [np.zeros_like(run.temperature_c) for run in found.problem.runs]
     watts[1][100:200, 3] = -0.2
     changed.heat = dataclasses.replace(found.heat, watts=watts)
