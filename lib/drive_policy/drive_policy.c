@@ -279,7 +279,7 @@ static void hold(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
     drive_policy_spring_t *s = &policy->spring[k];
     const spring_belief_t *b = belief_of(in, k);
     const bool full = is_full(level_permille);
-    const bool sees = spring_estimator_sees(b);
+    const bool knows = spring_estimator_knows(b);
     const float level = full ? 1.0f : 0.001f * (float)level_permille;
     const bool settled = spring_estimator_rests(b);
     const bool losing = spring_estimator_seems_to_lose(b);
@@ -296,7 +296,7 @@ static void hold(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
     }
     const float sd_k = spring_estimator_hold_sd_k(in->belief, in->model, k);
     const float safe_k = safe_margin_k(policy, in, k, full, sd_k);
-    if (full && !sees) { /* who knows whether it has transformed: above that first, then down */
+    if (full && !knows) { /* who knows whether it has transformed: above that first, then down */
         s->margin_k -= BLIND_K_PER_S * TURN_S;
         s->margin_k = s->margin_k < safe_k ? safe_k : s->margin_k;
     } else if (spring_estimator_on_trial(b)) {

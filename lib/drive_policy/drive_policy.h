@@ -38,7 +38,7 @@ typedef enum {
     DRIVE_POLICY_LIMIT_UNDRIVEN = 16,   /* an undriven neighbour would come near austenite start */
     DRIVE_POLICY_LIMIT_OVERLOAD = 32, /* the board was above its continuous current for too long */
     DRIVE_POLICY_LIMIT_TRIP = 64,     /* a limit stayed fully derated: off until cleared */
-    DRIVE_POLICY_LIMIT_BLIND = 128,   /* its resistance shows no phase: the model alone */
+    DRIVE_POLICY_LIMIT_BLIND = 128,   /* its resistance proves no phase: the model alone */
     DRIVE_POLICY_LIMIT_COOLING = 256, /* it may still be hot from before power-on: it waits */
     DRIVE_POLICY_LIMIT_AWAY = 512     /* not where it was asked to be, or that cannot be seen */
 } drive_policy_limit_t;

@@ -614,22 +614,23 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
                                  bool full)
 {
     spring_belief_t *b = &e->spring[k];
-    /* neither has it come to its finish, nor is that seen */
-    const bool unproven = full && b->heating && !surely_finished(b, model, k, 0.0f) &&
-                          !spring_estimator_has_transformed(e, model, k);
+    const bool ends = full && b->heating;
+    const bool unseen = ends && b->possible != SPRING_PHASE_AUSTENITE;
+    const bool lacks = unseen && spring_estimator_lacks_phase(b, model, k);
+    /* neither has it come to its finish, nor is that seen; or what it reads says otherwise */
+    const bool unproven = lacks || (ends && !surely_finished(b, model, k, 0.0f) &&
+                                    !spring_estimator_has_transformed(e, model, k));
     const spring_before_t before = spring_before(b, model, k);
-    const bool unseen = full && b->heating && b->possible != SPRING_PHASE_AUSTENITE;
     const bool was_austenite = b->possible == SPRING_PHASE_AUSTENITE;
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {
-        /* as hot as it may be, and what it reads shows none of it, or says that phase is missing */
-        b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE ||
-                   spring_estimator_lacks_phase(b, model, k);
+        /* as hot as it may be, and what it reads shows none of it */
+        b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE;
         b->possible = SPRING_PHASE_AUSTENITE;
         spring_set_temperature(model, k, spring_now_c(model, k), SPRING_PHASE_AUSTENITE);
     } else if (!full && b->possible == SPRING_PHASE_AUSTENITE) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
     }
-    if (full && b->heating && b->onset && spring_estimator_sees(b) && b->current_a > STRONG_A) {
+    if (ends && b->onset && !lacks && spring_estimator_sees(b) && b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
     }
     b->heating = b->left = false;

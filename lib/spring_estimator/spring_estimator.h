@@ -131,8 +131,8 @@ typedef struct {
     uint8_t averaged;   /* turns in slow_ohm, saturating */
     uint16_t unsteady;  /* turns, of all that a contact or the sensor has jumped lately */
     /* bits: of nine springs they are a good part of the RAM that is spare */
-    bool unproven : 1;  /* since its heating its contact came and went: what it seemed to gain may
-                         * have been that */
+    bool unproven : 1;  /* that its heating has transformed it: its contact came and went, a limit
+                         * ended it, or what it reads lacks phase */
     bool odd : 1;       /* the turn before read what no phase changes to so fast */
     bool reads : 1;     /* the last turn had readings fit for use */
     bool unread : 1;    /* a turn without them lies before those that it goes by */
@@ -420,10 +420,11 @@ static inline float spring_estimator_noise(const spring_belief_t *belief)
 bool spring_estimator_sees(const spring_belief_t *belief);
 /* What it reads tells nothing of its phase: it shows none, or its contact is loose. */
 bool spring_estimator_blind(const spring_belief_t *belief);
-/* So it is, or readings are not used: the model alone tells. */
+/* So it is, or what it reads is not proven, or readings are not used: the model alone tells. */
 static inline bool spring_estimator_by_model(const spring_estimator_t *estimator, uint8_t spring)
 {
-    return spring_estimator_blind(&estimator->spring[spring]) || !estimator->observes;
+    const spring_belief_t *b = &estimator->spring[spring];
+    return spring_estimator_blind(b) || b->unproven || !estimator->observes;
 }
 /* Its phase is known: its resistance tells it, and nothing is left that speaks against its having
  * transformed. How far from its transformation it is need not be. */

@@ -61,7 +61,7 @@ static float phase_sd(const spring_estimator_t *e, const thermal_model_t *model,
     const spring_belief_t *b = &e->spring[k];
     switch (phase_source(b)) {
     case BY_LOSS:
-        return spring_estimator_blind(b) ? UNIFORM_SD : PHASE_SD;
+        return spring_estimator_blind(b) || b->unproven ? UNIFORM_SD : PHASE_SD;
     case BY_RESISTANCE:
         return PHASE_READ_SD + b->noise / fabsf(b->learnt.change);
     case BY_MARTENSITE:

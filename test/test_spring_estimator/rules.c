@@ -456,12 +456,14 @@ TEST(phase_is_told_by_the_best_that_there_is)
         {SPRING_PHASE_BETWEEN, false, false, 0.22f, 0.176f, 0.0f, 0.29f, 0.0f},
         {SPRING_PHASE_MARTENSITE, true, false, 0.22f, 0.176f, 0.0f, 0.03f, 0.0f},
     };
-    for (size_t n = 0; n < ROWS(table); n++) {
+    for (size_t j = 0; j < 2 * ROWS(table); j++) {
+        const size_t n = j / 2, i = j % 2;
         begin_cold();
         row(n);
         INSIDE.possible = table[n].possible;
         INSIDE.reads = table[n].reads;
-        INSIDE.blind = table[n].blind;
+        INSIDE.blind = table[n].blind && i == 0;
+        INSIDE.unproven = table[n].blind && i != 0; /* is as wide */
         INSIDE.lost = 0.1f;
         INSIDE.noise = table[n].noise;
         INSIDE.phase_ohm = 0.198f;
