@@ -70,7 +70,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "swarm",
         "Worlds that nobody listed: everything drawn at once",
-        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2922",
+        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2923",
         markdown=True,
     ),
     Section(
