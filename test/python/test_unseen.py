@@ -19,6 +19,7 @@ from ninespring.find.unseen import LAG, OF_THAT_DAY, Foretold, Unseen, _hardly_s
 from ninespring.infer import budget
 from ninespring.infer.declared import base_spec
 from ninespring.infer.fit import Fit
+from ninespring.infer.likelihood import NONE, Colour
 from ninespring.infer.predict import predict
 from ninespring.infer.problem import Problem
 from ninespring.infer.result import model_of
@@ -755,6 +756,20 @@ def alone(later: float, seed: int) -> Run:
         warm += (drive[n, 0] - 0.012 * (1.0 + later * (n >= 1800)) * (warm - 21.0)) / 2.0
     shown += rng.normal(0.0, 0.1, shown.shape)
     return Run("heater", "", np.arange(3600.0), "command", drive, shown, np.zeros(3600), np.full(3600, 21.0))
+
+
+def test_what_was_fitted_by_least_squares_is_foretold_by_the_parts_of_a_run_alone_however_those_are_weighed() -> None:
+    """Beside slopes that were weighed otherwise all of its numbers seemed hardly shown by a part, and stayed as the rest had told them: what
+    was told as unseen had been fitted."""
+    problem = Problem(Array(1, 1), [alone(0.5, 1)], HEATERS)
+    base = first_fit(problem, base_spec(problem))
+    lasts = Colour(apart=(300.0, NONE), time_s=(60.0, 3600.0))
+    problem.take_for(lasts)
+    own = problem.fit(base.spec, base.as_dict(), errors=True)
+    by = Unseen(problem, Search(problem, [], base), base)
+    own_k = by.foretells(own, lasts)
+    by.known.clear()
+    assert by.foretells(base, lasts) == pytest.approx(own_k, rel=0.05)
 
 
 def test_a_model_is_not_better_for_what_a_part_of_a_run_does_not_tell_it() -> None:

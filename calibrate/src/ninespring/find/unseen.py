@@ -261,10 +261,22 @@ class Unseen:
         """Return how each run left out is foretold, the others fitted by how errors last; none where none can be."""
         key = fit.spec.variant, tuple(free.prior for free in fit.spec.free), colour
         if key not in self.known:
+            fit = self._as_weighed(fit, colour)
             each = [foretold(one, fit, colour) for one in self.splits]
             # parts of one run have errors of one size
             self.known[key] = [Foretold.together(each)] if self.alone else each
         return self.known[key]
+
+    def _as_weighed(self, fit: Fit, colour: Colour | None) -> Fit:
+        """Return a fit with its slopes weighed as those of its parts are, which tell what a part hardly shows: beside other weights it seems
+        to show nothing, and what the left-out part has told would stay."""
+        if fit.jacobian is not None and fit.weighed == colour:
+            return fit
+        kept = self.problem.colour
+        self.problem.take_for(colour)
+        fit = replace(fit, jacobian=self.problem.slopes(fit), weighed=colour)
+        self.problem.take_for(kept)
+        return fit
 
     def rmse(self, fit: Fit, colour: Colour | None = None) -> float:
         """Return the error, degC rms, that a model is judged by: of a run left out, its room apart; NaN where none can be."""
