@@ -334,15 +334,6 @@ def test_a_room_beside_its_log_in_short_runs_is_not_so_for_good() -> None:
 def test_what_a_room_explains_is_taken_out_as_far_as_it_is_unknown() -> None:
     moves, other = 1.0 - np.exp(-np.arange(600.0) / 200.0), 0.2 * np.sin(np.arange(600.0) / 10.0)
     off = 2.0 * moves + other
-    each = {sigma: room.without(off, sigma * moves[:, None], 10.0) for sigma in (3.0, 0.01)}
-    assert each[3.0][0] == pytest.approx(other, abs=0.05)
-    assert each[0.01][0] == pytest.approx(off, abs=0.05)
-    assert each[3.0][1] > 10.0 * each[0.01][1], "what was known no better is told at a price"
-    assert room.without(other, 0.0 * moves[:, None], 10.0) == (pytest.approx(other), 0.0)
-    # what is left and its price are what errors weigh that are not known apart from those numbers
-    many = np.column_stack([3.0 * moves, 0.5 * np.cos(np.arange(600.0) / 90.0)])
-    left, nats = room.without(off, many, 10.0)
-    noise = 10.0 * float(np.mean(left**2))
-    whole = noise * np.eye(600) + many @ many.T
-    exact = 0.5 * float(off @ np.linalg.solve(whole, off)) + 0.5 * np.linalg.slogdet(whole / noise)[1]
-    assert nats + 0.5 * float(left @ left) / noise == pytest.approx(exact, rel=1e-3)
+    assert room.without(off, moves, 3.0, 10.0) == pytest.approx(other, abs=0.05)
+    assert room.without(off, moves, 0.01, 10.0) == pytest.approx(off, abs=0.05)
+    assert room.without(other, 0.0 * moves, 3.0, 10.0) == pytest.approx(other)

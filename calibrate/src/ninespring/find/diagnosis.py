@@ -677,9 +677,9 @@ def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> re
     problem = case.problem
     if case.hidden:
         return _given(case, judged_by, unseen.pinned(judged_by.carried(case.final, judge.reduced)))
-    if problem.colour is not None:
+    if problem.colour is not None and len(problem.runs) > 1:
         bare = judged_by.carried(case.final, judge.reduced)
-        if unseen.WORSE * judged_by.rmse(bare) < judged_by.own(bare):
+        if judged_by.rmse(bare) < judged_by.own(bare):
             judge = _by_least_squares(case, case.final)
     account = judged_by.instead if judged_by.accounts else judged_by.plain
     given = judged_by.given(case.final, judged_by.carried(case.final, judge.reduced))

@@ -2,8 +2,7 @@
 
 Of several runs each is left out in turn (MOST of them); of one alone its last part, a half and a third of it. What is a run's own (its room where none
 was logged, its drift) is not carried over: a room is told by the run's first minute, as `predict` does. What is then off because the room is
-known no better counts in what is told, not in what models are judged by. Nor do numbers of a run alone that its part cannot tell: they count at
-the price of not having been known.
+known no better counts in what is told, not in what models are judged by.
 """
 
 from __future__ import annotations
@@ -140,40 +139,16 @@ def pinned(fit: Fit) -> Fit:
     return replace(fit, spec=held(fit.spec, {key: v for key, v in fit.as_dict().items() if key in found}))
 
 
-@dataclass(frozen=True)
-class Foretold:
-    """By how much what is left out differs from what a model fitted to a split's runs predicts, degC, where that counts."""
-
-    off: np.ndarray
-    judged: np.ndarray
-    """That without what explains it of what nobody could know any better: a room that was not logged, of a run alone its numbers."""
-    nats: float = 0.0
-    """What so many numbers cost that are told here, and were not by what was seen."""
-    independent: float = 1.0
-    """Readings that are."""
-
-    @staticmethod
-    def together(parts: Sequence[Foretold]) -> Foretold:
-        """Return several of them, whose errors are of one size, as one."""
-        each = [[getattr(one, name) for one in parts] for name in ("off", "judged", "nats", "independent")]
-        return Foretold(np.concatenate(each[0]), np.concatenate(each[1]), sum(each[2]), sum(each[3]))
-
-    @property
-    def error(self) -> float:
-        """What a model is judged by, degC rms: such white noise would make what is left out as likely as it is by all that the model
-        knew."""
-        return rms([self.judged]) * math.exp(self.nats / self.independent)
-
-
-def foretold(split: Split, fit: Fit, colour: Colour | None) -> Foretold:
-    """Return how what is left out is foretold by a model fitted to a split's runs."""
+def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, np.ndarray]:
+    """Return by how much what is left out differs from what a model fitted to a split's runs predicts, degC, where that counts; and
+    that without what a room explains that nobody logged."""
     problem, kept = split.problem, list(split.kept)
     spec, start = _of_these(fit, kept)
     problem.colour = None
     problem.learn_starts(spec, [start.get(f.key, f.start) for f in spec.free])
     if colour is not None:
         problem.take_for(colour)
-    beside = split.alone or not {RUN_AMBIENT, RUN_SENSOR}.isdisjoint(spec.effects)
+    beside = not split.alone and not {RUN_AMBIENT, RUN_SENSOR}.isdisjoint(spec.effects)
     fitted = problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS, errors=beside)
     # what only the left-out run shows, these do not tell: it stays, and what is known beside it alone goes with it
     if known := {key: start[key] for key in (*fitted.stuck, *_hardly_shown(fit, fitted, kept)) if key in start}:
@@ -182,11 +157,9 @@ def foretold(split: Split, fit: Fit, colour: Colour | None) -> Foretold:
     run, values = split.left_out, fitted.as_dict()
     if (share := room.around_share(values)) is not None:
         run = replace(run, around_share=share)
-    alike = max(1.0, BLOCK_S / float(np.median(np.diff(run.time_s))))
     if split.alone:
-        shown = problem.predictions(fitted.spec, fitted.values)
-        off = (run.temperature_c - shown[0])[split.counts]
-        return Foretold(off, *room.without(off, _unsure(split, fitted, shown), alike), off.size / alike)
+        off = (run.temperature_c - problem.simulate(spec, fitted.values, 0))[split.counts]
+        return off, off
     plant = problem.plant_for(spec, fitted.values)
 
     def off_in(ambient: np.ndarray, share: float) -> np.ndarray:
@@ -198,27 +171,19 @@ def foretold(split: Split, fit: Fit, colour: Colour | None) -> Foretold:
         seen_s = max(one.duration_s for one in problem.runs)
         ambient = run.ambient_c + room.beside_log_k(run, over_k, seen_s, settles_s(plant, run.springs))
         off = off_in(ambient, room.around_of(run, plant, float(ambient[0]), room.LOGGED_K))
-        return Foretold(off, off)
+        return off, off
     told, sigma, around = _room(problem, run, values, plant)
     ambient = np.full(len(run.time_s), told)
     off = off_in(ambient, around)
-    warmer = (off - off_in(ambient + 1.0, around)) * math.hypot(sigma, room.MOVES_K)
-    return Foretold(off, room.without(off, warmer[:, None], alike)[0])
+    alike = max(1.0, BLOCK_S / float(np.median(np.diff(run.time_s))))
+    return off, room.without(off, off - off_in(ambient + 1.0, around), math.hypot(sigma, room.MOVES_K), alike)
 
 
-def _unsure(split: Split, fitted: Fit, shown: Sequence[np.ndarray]) -> np.ndarray:
-    """Return what numbers, as unsure as what was seen leaves them, may change of what is left out of a run alone, (n, numbers), K."""
-    size, ways = np.linalg.eigh(fitted.covariance)
-    changes = split.problem.changes(fitted.spec, fitted.values, shown, range(len(fitted.values)))
-    each = np.column_stack([np.zeros(int(split.counts.sum())), *(one[0][split.counts] for one in changes)])[:, 1:]
-    return np.asarray(each @ (ways * np.sqrt(np.maximum(size, 0.0))))
-
-
-def of_a_run(each: Sequence[tuple[float, int]]) -> float:
-    """Return the error, degC rms, of a run by those of several and their readings: how large it is in each is fitted, and of their one
-    likelihood the mean is that of logarithms. So no run in which all models err, as of a start that nobody saw, outweighs the others."""
-    logarithms = [math.log(max(error, 1e-9)) for error, many in each if many]
-    return math.exp(np.average(logarithms, weights=[many for _, many in each if many])) if logarithms else math.nan
+def of_a_run(each: Sequence[np.ndarray]) -> float:
+    """Return the error, degC rms, of a run by those of several: how large it is in each is fitted, and of their one likelihood the mean
+    is that of logarithms. So no run in which all models err, as of a start that nobody saw, outweighs the others."""
+    logarithms = [math.log(max(rms([one]), 1e-9)) for one in each if one.size]
+    return math.exp(np.average(logarithms, weights=[one.size for one in each if one.size])) if logarithms else math.nan
 
 
 def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> tuple[float, float, float]:
@@ -241,7 +206,7 @@ class Unseen:
 
     def __post_init__(self) -> None:
         self.splits = splits(self.problem)
-        self.known: dict[Any, list[Foretold]] = {}
+        self.known: dict[Any, tuple[list[np.ndarray], list[np.ndarray]]] = {}
         self.lag = next((one for one in self.found.candidates if one.effect == LAG), None)
         self.lagged = self.base
         if self.lag is not None and LAG not in self.base.spec.effects:
@@ -252,19 +217,17 @@ class Unseen:
             self.lagged = self.problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS)
             self.problem.take_for(colour)
 
-    @property
-    def alone(self) -> bool:
-        """Whether it is parts of a run alone that are left out."""
-        return bool(self.splits) and self.splits[0].alone
-
-    def foretold(self, fit: Fit, colour: Colour | None = None) -> list[Foretold]:
-        """Return how each run left out is foretold, the others fitted by how errors last; none where none can be."""
+    def errors(self, fit: Fit, colour: Colour | None = None) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Return the errors, degC, of each run left out, the others fitted by how errors last, and those without what their rooms
+        explain; none where none can be."""
         key = fit.spec.variant, tuple(free.prior for free in fit.spec.free), colour
         if key not in self.known:
             fit = self._as_weighed(fit, colour)
-            each = [foretold(one, fit, colour) for one in self.splits]
-            # parts of one run have errors of one size
-            self.known[key] = [Foretold.together(each)] if self.alone else each
+            each = [errors(one, fit, colour) for one in self.splits]
+            off, judged = [off for off, _ in each], [judged for _, judged in each]
+            if each and self.splits[0].alone:  # parts of one run, whose errors are of one size
+                off, judged = [np.concatenate(off)], [np.concatenate(judged)]
+            self.known[key] = off, judged
         return self.known[key]
 
     def _as_weighed(self, fit: Fit, colour: Colour | None) -> Fit:
@@ -280,16 +243,11 @@ class Unseen:
 
     def rmse(self, fit: Fit, colour: Colour | None = None) -> float:
         """Return the error, degC rms, that a model is judged by: of a run left out, its room apart; NaN where none can be."""
-        return of_a_run([(one.error, one.off.size) for one in self.foretold(fit, colour)])
+        return of_a_run(self.errors(fit, colour)[1])
 
     def foretells(self, fit: Fit, colour: Colour | None = None) -> float:
         """Return the error, degC rms, of a run left out, its room told by its first minute."""
-        return of_a_run([(rms([one.off]), one.off.size) for one in self.foretold(fit, colour)])
-
-    def given_by(self, fit: Fit, colour: Colour | None = None) -> float:
-        """Return the error that a model is given by: of runs left out, each in the room that its first minute tells, as it will be used;
-        of parts of a run alone, whose numbers the rest of it tells, the one that it is judged by."""
-        return self.rmse(fit, colour) if self.alone else self.foretells(fit, colour)
+        return of_a_run(self.errors(fit, colour)[0])
 
     def own(self, fit: Fit) -> float:
         """Return the error of what was found, or a part of it, its numbers as likely as the problem's colour has them."""
@@ -316,7 +274,7 @@ class Unseen:
         return best
 
     def _rather(self, one: Fit, other: Fit) -> Fit:
-        return one if self.given_by(one) <= self.given_by(other) / WORSE else other
+        return one if self.foretells(one) <= self.foretells(other) / WORSE else other
 
     def worse(self, fit: Fit) -> bool:
         """Return whether something foretells the unseen worse than the better of both baselines."""
@@ -325,7 +283,7 @@ class Unseen:
     def given_worse(self, fit: Fit) -> bool:
         """Return whether runs left out, each in the room that its first minute tells, are foretold worse than by what is given instead:
         a model is given to predict such runs."""
-        return self.given_by(fit, self.problem.colour) > WORSE * self.given_by(self.instead)
+        return self.foretells(fit, self.problem.colour) > WORSE * self.foretells(self.instead)
 
     def tells(self, fit: Fit, without: Fit) -> bool:
         """Return whether most of what is off in the unseen without an effect is foretold with it: no stand-in does that. Or, in runs
@@ -337,13 +295,13 @@ class Unseen:
         if off <= FORETOLD * bare:
             return True
         of_many = off <= PART * bare and off <= FORETOLD * self.rmse(self.better) ** 2
-        return of_many and not self.alone and COMES_TRUE <= self.comes_true(fit, without) < math.inf
+        return of_many and not self.splits[0].alone and COMES_TRUE <= self.comes_true(fit, without) < math.inf
 
     def comes_true(self, fit: Fit, without: Fit) -> float:
         """Return what part of that by which an effect changes what is foretold of the unseen is there: 1 of a cause, 0.5 where it
         is foretold no better than without. Infinite where it changes next to nothing."""
-        off = [one.judged for one in self.foretold(without, self.problem.colour)]
-        moved = [one - other.judged for one, other in zip(off, self.foretold(fit, self.problem.colour), strict=True)]
+        off = self.errors(without, self.problem.colour)[1]
+        moved = [one - other for one, other in zip(off, self.errors(fit, self.problem.colour)[1], strict=True)]
         if rms(moved) < EQUIVALENT * self.problem.noise_c:
             return math.inf
         large = [max(rms([one]), self.problem.noise_c) ** 2 for one in off]  # a run counts by its own likelihood
@@ -353,7 +311,7 @@ class Unseen:
     def carried(self, fit: Fit, reduced: Callable[[Fit, str], Fit]) -> Fit:
         """Return a fit without what is of that day: no other run tells that, and beside it a part of the runs tells little of
         the rest. What a run alone began with is the rest's, too: only what drifts is not, where it does not foretell the rest."""
-        alone = self.alone
+        alone = bool(self.splits) and self.splits[0].alone
         if alone and not self.worse(fit):
             return fit
         for effect, variant in fit.spec.variant:
@@ -366,7 +324,7 @@ class Unseen:
         """Return what a model is made of: a fit, or that without what is of that day (`carried`), where beside it the other numbers
         foretell worse: what bends has taken up what is the array's."""
         colour = self.problem.colour
-        return carried if self.given_by(fit, colour) > WORSE * self.given_by(carried, colour) else fit
+        return carried if self.foretells(fit, colour) > WORSE * self.foretells(carried, colour) else fit
 
     def kept(self, fit: Fit, reduced: Callable[[Fit, str], Fit]) -> tuple[Fit | None, list[str]]:
         """Return what predicts no worse than the better of both, names left out one by one, None where nothing of it does; and
@@ -414,30 +372,22 @@ class Unseen:
 
     @property
     def _what(self) -> str:
-        return "the last part of the run (a half and a third of it)" if self.alone else "a run that the fit did not see"
+        alone = self.splits[0].alone
+        return "the last part of the run (a half and a third of it)" if alone else "a run that the fit did not see"
 
     def told(self, fit: Fit, why: str = "") -> results.Unseen | None:
         """Return what diagnosis.json says of the model that is given, None where nothing can be left out; `why` it is given instead."""
-        colour = None if why else self.problem.colour
-        mine = self.foretells(fit, colour)
+        mine = self.foretells(fit, None if why else self.problem.colour)
         if not math.isfinite(mine):
             return None
         declared, lagged = self.foretells(self.base), self.foretells(self.lagged)
-        text = f"{self._what} is predicted to {mine:.2f} K (declared model, fitted: {declared:.2f}, with a lag: {lagged:.2f})"
-        if self.alone and mine > WORSE * min(declared, lagged):
-            judged = [self.rmse(self.base), self.rmse(self.lagged)]
-            text += (
-                f"; judged by what so short a part of it could know of numbers, to {self.rmse(fit, colour):.2f} K "
-                f"({judged[0]:.2f}, {judged[1]:.2f})"
-            )
-        if why:
-            text += f". The model is the declared model{self._with(fit)}, by least squares: {why}"
         return results.Unseen(
-            what="last part" if self.alone else "each run left out in turn",
+            what="last part" if self.splits[0].alone else "each run left out in turn",
             rmse_c=mine,
             declared_rmse_c=declared,
             with_lag_rmse_c=lagged,
-            text=text,
+            text=f"{self._what} is predicted to {mine:.2f} K (declared model, fitted: {declared:.2f}, with a lag: {lagged:.2f})"
+            + (f". The model is the declared model{self._with(fit)}, by least squares: {why}" if why else ""),
         )
 
     def _with(self, model: Fit) -> str:

@@ -473,12 +473,6 @@ class Problem:
     ) -> np.ndarray:
         """Return d(residual vector)/d(inner coordinate) by one-sided differences, simulated in parallel."""
         columns = range(len(spec.free)) if columns is None else columns
-        return self.vectors(self.changes(spec, values, predicted, columns)).T
-
-    def changes(
-        self, spec: Spec, values: np.ndarray, predicted: Sequence[np.ndarray], columns: Sequence[int]
-    ) -> list[list[np.ndarray | None]]:
-        """Return what a unit of each of these numbers, in its inner coordinate, changes of what is left, per run; None: nothing."""
         jobs: list[tuple[Spec, Values, int]] = []
         where: list[tuple[int, int, float]] = []
         for c in columns:
@@ -499,7 +493,7 @@ class Problem:
         changes: list[list[np.ndarray | None]] = [[None] * len(self.runs) for _ in position]
         for (c, r, step), field_c in zip(where, shown, strict=True):
             changes[position[c]][r] = (predicted[r] - field_c) / step
-        return changes
+        return self.vectors(changes).T
 
     def fit(
         self,

@@ -235,19 +235,16 @@ def over_first(runs: Sequence[Run], ambient_c: Sequence[float]) -> tuple[float, 
     return mean, apart * math.sqrt(1.0 + 1.0 / over.size)
 
 
-def without(off: np.ndarray, moves: np.ndarray, alike: float) -> tuple[np.ndarray, float]:
-    """Return errors of a prediction, (n,), K, less what explains them of numbers that are not known any better, and the nats that this
-    costs: how far those had to go, and how much they might have explained. `moves`, (n, numbers), is what one sigma of each changes.
+def without(off: np.ndarray, moves: np.ndarray, sigma_k: float, alike: float) -> np.ndarray:
+    """Return errors of a prediction, K, less what its room explains, known to `sigma_k`; `moves` is what one kelvin of it changes.
 
     So many errors as are `alike` count as one.
     """
-    left, nats = off, 0.0
+    shift = 0.0
     for _ in range(5):  # what is left says how much an error weighs
-        weight = 1.0 / (alike * max(float(np.mean(left**2)), 1e-12))
-        told = weight * (moves.T @ moves) + np.eye(moves.shape[1])
-        shift = np.linalg.solve(told, weight * (moves.T @ off))
-        left, nats = off - moves @ shift, 0.5 * float(shift @ shift + np.linalg.slogdet(told)[1])
-    return left, nats
+        weight = 1.0 / (alike * max(float(np.mean((off - shift * moves) ** 2)), 1e-12))
+        shift = weight * float(moves @ off) / (weight * float(moves @ moves) + 1.0 / sigma_k**2)
+    return off - shift * moves
 
 
 def over_logged_k(values: Mapping[str, float], errors: Mapping[str, float]) -> float | None:
