@@ -165,6 +165,18 @@ def test_a_first_minute_counts_as_far_as_those_of_the_fitted_runs_told_their_roo
     assert room.Rooms.of(runs[:3], rooms[:3], lags).misses_k < 0.3 < 2.0 < known.misses_k
 
 
+def test_what_a_fit_does_not_know_of_its_numbers_is_not_taken_for_a_room() -> None:
+    """A run that begins warm, its drive a fifth stronger by the model than it was: what does not come of that is the drive's or the room's."""
+    plant = native.Plant(1, 1)
+    plant.set_all({"heat_capacity_j_per_k": 2.25, "loss_w_per_k": 0.0125, "command_power_w[1]": 1.2})
+    run = one_run(20.0, 45.0)
+    sure, unsure = (room.Rooms(20.0, errors=one) for one in ({}, {"command_power_w[1]": 0.2, "sensor_lag_s": 1.0}))
+    value, sigma, _ = sure.told(run, plant)
+    assert value < 17.0 and sigma < 2.5
+    value, sigma, _ = unsure.told(run, plant)
+    assert value == pytest.approx(20.0, abs=1.0) and sigma > 2.5
+
+
 def test_a_run_that_began_warm_is_not_taken_for_one_at_rest() -> None:
     def nothing(part: Run, ambient_c: float, offset: np.ndarray) -> np.ndarray:
         """A plant that a room does not change: the first minute says nothing."""

@@ -66,6 +66,16 @@ class Fit:
             out[f.key] = inner * (abs(self.values[k]) if f.log else f.scale)
         return out
 
+    def errors_of_settings(self) -> dict[str, float]:
+        """Return standard errors of the plant's parameters that its numbers make; those that the data cannot fix are left out."""
+        out: dict[str, float] = {}
+        for free, error in zip(self.spec.free, self.stderr().values(), strict=True):
+            if math.isfinite(error):
+                out |= dict.fromkeys(free.names, error)
+                for name, weight in free.shifts:
+                    out[name] = math.hypot(out.get(name, 0.0), weight * error)
+        return out
+
     def intervals(self) -> dict[str, tuple[float, float]]:
         """Return where each number lies in 95 of 100 cases, in its own unit; numbers that the data cannot fix are left out.
 

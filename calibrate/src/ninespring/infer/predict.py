@@ -68,7 +68,7 @@ def in_its_room(model: Model, run: Run) -> Run:
     elif room.begun(run) is not None:
         over = known.get("room_over_first_k"), known.get("room_over_first_sigma_k")
         spread_k, misses_k = known.get("room_spread_k", room.ROOMS_K), known.get("room_first_minute_misses_k", 0.0)
-        told = room.Rooms(plant.get("ambient_c"), spread_k, None if None in over else over, misses_k)
+        told = room.Rooms(plant.get("ambient_c"), spread_k, None if None in over else over, misses_k, model.stderr)
         value, sigma, share = told.told(run, plant)
         notes = [f"no ambient_c: by the first minute the room is at {value:.1f} degC (+-{sigma:.1f})"]
         run = replace(run, ambient_c=np.full(len(run.time_s), value))

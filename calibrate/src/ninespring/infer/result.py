@@ -65,11 +65,7 @@ def model_of(
     model.parameters = dict(problem.declared) | {k: v for k, v in fit.spec.fixed}
     errors = fit.stderr()
     model.parameters |= fit.spec.settings(fit.values, problem.base_value)
-    for free in fit.spec.free:
-        if math.isfinite(errors[free.key]):
-            model.stderr |= dict.fromkeys(free.names, errors[free.key])
-            for name, weight in free.shifts:
-                model.stderr[name] = math.hypot(model.stderr.get(name, 0.0), weight * errors[free.key])
+    model.stderr = fit.errors_of_settings()
     constants = [fit.value(f.key) for f in fit.spec.free if f.key.startswith("ambient_c@")]
     rooms = [f.run for f in fit.spec.free if f.key.startswith("ambient_c@") and f.run is not None]
     if constants:

@@ -8,10 +8,11 @@ model lacks.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -361,20 +362,23 @@ def of_run(
     shows: Shows,
     fades: float,
     misses_k: float = 0.0,
+    unsure: Sequence[Shows] = (),
 ) -> tuple[float, float]:
     """Return how warm the room of a run is and one sigma of it, by its first minute, which tells rooms no better than to `misses_k`,
     and guesses before it.
 
-    `shows` simulates a run with a room (degC) and errors of the first readings (springs,), K.
+    `shows` simulates a run with a room (degC) and errors of the first readings (springs,), K; so does each of `unsure`, a number of
+    the model as far off as one sigma of it.
     """
     part, usual = begun(run), _moments(guess)
     if part is None:
         return usual
     value, sigma = usual
     for _ in range(2):  # what heats is not straight, but nearly
-        warmer = [shows(part, value + 1.0, np.zeros(run.springs))]
+        none = np.zeros(run.springs)
+        other = [shows(part, value + 1.0, none), *(one(part, value, none) for one in unsure)]
         # nothing is believed of the room: what the readings alone say
-        off, spread = _by_first_minute(part, value, warmer, [1e-6], shows, fades)
+        off, spread = _by_first_minute(part, value, other, [1e-6, *[1.0] * len(unsure)], shows, fades)
         said = value + float(off[0])
         variance = (
             float(spread[0, 0]) + (LOSS_OFF * max(0.0, np.nanmax(part.temperature_c[0]) - usual[0])) ** 2 + misses_k**2
@@ -407,9 +411,13 @@ class Rooms:
     misses_k: float = 0.0
     """By how much their first minutes, as the model shows them, tell other rooms than all of them did, rms: a model is off by
     more than noise, and mostly so where a spring begins to warm."""
+    errors: Mapping[str, float] = field(default_factory=dict)
+    """Of the plant's parameters, as well as the fit knows them: what they may be off by must not count as a room's."""
 
     @staticmethod
-    def of(runs: Sequence[Run], ambient_c: Sequence[float], plant: native.Plant) -> Rooms:
+    def of(
+        runs: Sequence[Run], ambient_c: Sequence[float], plant: native.Plant, errors: Mapping[str, float] | None = None
+    ) -> Rooms:
         """Return that for runs whose rooms were fitted, and the plant that was."""
         if not runs:
             return Rooms(plant.get("ambient_c"))
@@ -417,22 +425,42 @@ class Rooms:
         unknown = [Guess(0.0, usual, ANYWHERE_K)]
         parts = zip(runs, ambient_c, strict=True)
         off = [_shown(run, plant, unknown)[0] - fitted for run, fitted in parts if begun(run) is not None]
-        return Rooms(
-            usual, spread_k(ambient_c), over_first(runs, ambient_c), statistics.rms([np.array(off)]) if off else 0.0
-        )
+        misses_k = statistics.rms([np.array(off)]) if off else 0.0
+        return Rooms(usual, spread_k(ambient_c), over_first(runs, ambient_c), misses_k, errors or {})
 
     def told(self, run: Run, plant: native.Plant) -> tuple[float, float, float]:
         """Return how warm the room of a run is and one sigma of it, as a fitted plant shows its first minute, and how warm what is around
         springs that begin warm."""
         guess = guessed(run, self.usual_c, self.over, self.spread_k)
-        value, sigma = _shown(run, plant, guess, self.misses_k)
+        unsure = _unsure(plant, self.errors)
+        value, sigma = _shown(run, plant, guess, self.misses_k, unsure)
         if (share := around_of(run, plant, value, sigma)) != run.around_share:
-            value, sigma = _shown(replace(run, around_share=share), plant, guess, self.misses_k)
+            value, sigma = _shown(replace(run, around_share=share), plant, guess, self.misses_k, unsure)
         return value, sigma, share
 
 
-def _shown(run: Run, plant: native.Plant, guess: Sequence[Guess], misses_k: float = 0.0) -> tuple[float, float]:
-    return of_run(run, guess, _shows(plant), fades_per_s(plant), misses_k)
+def _unsure(plant: native.Plant, errors: Mapping[str, float]) -> list[native.Plant]:
+    """Return plants in which one parameter each is off by its error; less, where no plant has more."""
+    out = []
+    for name, error in errors.items():
+        for off in (error, -error):
+            moved = plant.copy()
+            with contextlib.suppress(native.NativeError):
+                moved.set(name, plant.get(name) + off)
+                if moved.check() is None:
+                    out.append(moved)
+                    break
+    return out
+
+
+def _shown(
+    run: Run,
+    plant: native.Plant,
+    guess: Sequence[Guess],
+    misses_k: float = 0.0,
+    unsure: Sequence[native.Plant] = (),
+) -> tuple[float, float]:
+    return of_run(run, guess, _shows(plant), fades_per_s(plant), misses_k, [_shows(one) for one in unsure])
 
 
 def _shows(plant: native.Plant) -> Shows:
