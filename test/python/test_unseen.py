@@ -82,6 +82,14 @@ def test_a_name_that_others_carry_along_goes_by_itself() -> None:
     assert kept is both and not said
 
 
+def test_a_name_without_which_twice_as_much_of_the_unseen_is_left_stays_however_little_comes_true() -> None:
+    """It foretells most of what is off without it, which no stand-in does: what it overdoes is its numbers, which a part tells badly."""
+    errors = {"": 2.0, "lag": 2.0, "shared_air sensor_gain": 0.9, "shared_air": 2.3, "sensor_gain": 3.0}
+    both = model("shared_air", "sensor_gain")
+    kept, said = Told(errors, {"sensor_gain": 0.72}).kept(both, without)
+    assert kept is both and not said
+
+
 def test_a_run_in_which_all_models_err_does_not_outweigh_the_others() -> None:
     """A run began hot after nobody saw what: there a true lag foretells worse by chance, in both others many times better."""
     told = Told({})
@@ -761,3 +769,14 @@ def test_what_was_fitted_by_least_squares_is_foretold_by_the_parts_of_a_run_alon
     own_k = by.foretells(own, lasts)
     by.known.clear()
     assert by.foretells(base, lasts) == pytest.approx(own_k, rel=0.05)
+
+
+def test_what_stays_as_all_runs_had_it_does_not_hang_on_the_model_that_is_judged() -> None:
+    """One that leaves a number open would have had it told by what is left out, and been judged by what was fitted."""
+    problem = Problem(Array(1, 1), [alone(0.5, 1)], HEATERS)
+    base = first_fit(problem, base_spec(problem))
+    by = Unseen(problem, Search(problem, [], base), base)
+    own_k = by.rmse(base)
+    assert base.jacobian is not None and by.stay == [[], []]
+    by.known.clear()
+    assert by.rmse(replace(base, jacobian=100.0 * base.jacobian)) == own_k

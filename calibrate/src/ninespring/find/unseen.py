@@ -7,6 +7,7 @@ known no better counts in what is told, not in what models are judged by.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -112,6 +113,18 @@ def _of_these(fit: Fit, kept: Sequence[int]) -> tuple[Spec, dict[str, float]]:
     return replace(fit.spec, free=tuple(free)), {_own(f, kept): v for f, v in mine if f.knot is None}
 
 
+def stays(split: Split, base: Fit) -> list[str]:
+    """Return the declared numbers of which a split's runs tell next to nothing beside all of them, by the declared model: in whatever is
+    judged they stay as it had them by all. Else what leaves its numbers open would have been told by what is left out, and what has
+    them told would not."""
+    problem, kept = split.problem, list(split.kept)
+    spec, start = _of_these(base, kept)
+    problem.colour = None
+    problem.learn_starts(spec, [start.get(f.key, f.start) for f in spec.free])
+    part = problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS)
+    return _hardly_shown(base, part, kept)
+
+
 def _hardly_shown(whole: Fit, part: Fit, kept: Sequence[int]) -> list[str]:
     """Return the declared numbers of which a part of the runs tells next to nothing beside all of them: that they are off there says
     nothing of an effect."""
@@ -139,19 +152,20 @@ def pinned(fit: Fit) -> Fit:
     return replace(fit, spec=held(fit.spec, {key: v for key, v in fit.as_dict().items() if key in found}))
 
 
-def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, np.ndarray]:
+def errors(split: Split, fit: Fit, colour: Colour | None, stay: Sequence[str] = ()) -> tuple[np.ndarray, np.ndarray]:
     """Return by how much what is left out differs from what a model fitted to a split's runs predicts, degC, where that counts; and
-    that without what a room explains that nobody logged."""
+    that without what a room explains that nobody logged. Numbers that `stay` are as the fit has them."""
     problem, kept = split.problem, list(split.kept)
     spec, start = _of_these(fit, kept)
     problem.colour = None
     problem.learn_starts(spec, [start.get(f.key, f.start) for f in spec.free])
     if colour is not None:
         problem.take_for(colour)
-    beside = not split.alone and not {RUN_AMBIENT, RUN_SENSOR}.isdisjoint(spec.effects)
+    guessed = not {RUN_AMBIENT, RUN_SENSOR}.isdisjoint(spec.effects) or split.left_out.ambient_c is None
+    beside = not split.alone and guessed
     fitted = problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS, errors=beside)
     # what only the left-out run shows, these do not tell: it stays, and what is known beside it alone goes with it
-    if known := {key: start[key] for key in (*fitted.stuck, *_hardly_shown(fit, fitted, kept)) if key in start}:
+    if known := {key: start[key] for key in (*fitted.stuck, *stay) if key in start}:
         start = fitted.as_dict() | known
         fitted = problem.fit(held(spec, known), start, tolerance=1e-3, max_steps=STEPS, errors=beside, near=fitted)
     run, values = split.left_out, fitted.as_dict()
@@ -172,7 +186,7 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, n
         ambient = run.ambient_c + room.beside_log_k(run, over_k, seen_s, settles_s(plant, run.springs))
         off = off_in(ambient, room.around_of(run, plant, float(ambient[0]), room.LOGGED_K))
         return off, off
-    told, sigma, around = _room(problem, run, values, plant)
+    told, sigma, around = _room(problem, run, fitted, plant)
     ambient = np.full(len(run.time_s), told)
     off = off_in(ambient, around)
     alike = max(1.0, BLOCK_S / float(np.median(np.diff(run.time_s))))
@@ -186,11 +200,13 @@ def of_a_run(each: Sequence[np.ndarray]) -> float:
     return math.exp(np.average(logarithms, weights=[one.size for one in each if one.size])) if logarithms else math.nan
 
 
-def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> tuple[float, float, float]:
+def _room(problem: Problem, run: Run, fit: Fit, plant: Any) -> tuple[float, float, float]:
     """Return how warm the room of a run was, one sigma of it and how warm what was around its springs, as `predict` tells it by the runs
     that were fitted."""
+    values = fit.as_dict()
     rooms = {r: values[f"ambient_c@{r + 1}"] for r in range(len(problem.runs)) if f"ambient_c@{r + 1}" in values}
-    return room.Rooms.of([problem.begun(r, values) for r in rooms], list(rooms.values()), plant).told(run, plant)
+    begun = [problem.begun(r, values) for r in rooms]
+    return room.Rooms.of(begun, list(rooms.values()), plant, fit.errors_of_settings()).told(run, plant)
 
 
 @dataclass
@@ -222,24 +238,17 @@ class Unseen:
         explain; none where none can be."""
         key = fit.spec.variant, tuple(free.prior for free in fit.spec.free), colour
         if key not in self.known:
-            fit = self._as_weighed(fit, colour)
-            each = [errors(one, fit, colour) for one in self.splits]
+            each = [errors(one, fit, colour, stay) for one, stay in zip(self.splits, self.stay, strict=True)]
             off, judged = [off for off, _ in each], [judged for _, judged in each]
             if each and self.splits[0].alone:  # parts of one run, whose errors are of one size
                 off, judged = [np.concatenate(off)], [np.concatenate(judged)]
             self.known[key] = off, judged
         return self.known[key]
 
-    def _as_weighed(self, fit: Fit, colour: Colour | None) -> Fit:
-        """Return a fit with its slopes weighed as those of its parts are, which tell what a part hardly shows: beside other weights it seems
-        to show nothing, and what the left-out part has told would stay."""
-        if fit.jacobian is not None and fit.weighed == colour:
-            return fit
-        kept = self.problem.colour
-        self.problem.take_for(colour)
-        fit = replace(fit, jacobian=self.problem.slopes(fit), weighed=colour)
-        self.problem.take_for(kept)
-        return fit
+    @functools.cached_property
+    def stay(self) -> list[list[str]]:
+        """Of each split, the numbers that stay as all runs had them."""
+        return [stays(one, self.base) for one in self.splits]
 
     def rmse(self, fit: Fit, colour: Colour | None = None) -> float:
         """Return the error, degC rms, that a model is judged by: of a run left out, its room apart; NaN where none can be."""
@@ -339,7 +348,11 @@ class Unseen:
             if not self.worse(bare):
                 if any(of_that_day(*one) and one[0] not in self.base.spec.effects for one in fit.spec.variant):
                     break  # the unseen has that day's, too: it says too little of what comes true
-                true = {effect: self.comes_true(bare, fewer[effect]) for effect in names}
+                # what foretells most of what is off without it is there, however much of it comes true
+                true = {
+                    effect: math.inf if self.tells(bare, other) else self.comes_true(bare, other)
+                    for effect, other in fewer.items()
+                }
                 out = min(true, key=true.__getitem__)
                 if true[out] >= COMES_TRUE:
                     break
