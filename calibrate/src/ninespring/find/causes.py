@@ -15,7 +15,7 @@ from ..infer.heat import THIN, answers, power_of, step_answers, thin
 from ..infer.problem import Problem
 from ..io.logs.run import Run
 from ..model.simulate import simulate_run
-from .windows import steps_up
+from .pursuit import steps_up
 
 GRID_S = 15.0
 """Times at which something may begin or end."""
@@ -61,12 +61,29 @@ class Cause:
         """The words for what acts for a while where it comes and goes all the time, in any run."""
         return f"{self.text.partition(', {}')[0]} again and again"
 
+    @property
+    def run(self) -> int:
+        """Number of the run, the first, in which it acts."""
+        return next(r for r, profile in enumerate(self.profiles) if profile is not None)
+
+    @property
+    def place(self) -> int:
+        """The spring, from 0, at which alone it acts; -1 where at several."""
+        acting = (profile.any(axis=0) for profile in self.profiles if profile is not None)
+        there = {int(k) for springs in acting for k in np.flatnonzero(springs)}
+        return there.pop() if len(there) == 1 else -1
+
 
 def _delayed(power: np.ndarray, time_s: np.ndarray, delay_s: float) -> np.ndarray:
     step = float(np.median(np.diff(time_s)))
     keep = math.exp(-step / delay_s)
     # as scipy.signal.lfilter, which loads all of scipy.stats: a fifth of what every command that fits loads
     return np.array(list(accumulate((1.0 - keep) * power, lambda last, now: now + keep * last)))
+
+
+def samples_of(problem: Problem) -> tuple[int, ...]:
+    """Return the samples of each run: every THIN rows one of each spring."""
+    return tuple(len(range(0, len(mask), THIN)) * mask.shape[1] for mask in problem.mask)
 
 
 def thinned(problem: Problem, columns: np.ndarray) -> np.ndarray:
@@ -148,7 +165,6 @@ def library(problem: Problem, fit: Fit) -> list[Cause]:
     profiles: dict[tuple[str, str], list[np.ndarray | None]] = {}
     columns: dict[tuple[str, str], list[np.ndarray]] = {}
     windows: list[Cause] = []
-    samples = [len(range(0, len(mask), THIN)) * mask.shape[1] for mask in problem.mask]
     for r, run in enumerate(problem.runs):
         power, by_key = power_of(problem, fit, r), fit.as_dict()
         plant = problem.plant_for(fit.spec, fit.values, r)
@@ -167,11 +183,11 @@ def library(problem: Problem, fit: Fit) -> list[Cause]:
         heating = [key for key in acting if key[0] not in SHOWN]
         moved = dict(zip(heating, answers(problem, fit, r, [acting[key] for key in heating], typical), strict=True))
         for key, profile in acting.items():
-            nothing = [np.zeros((one, 1), dtype=np.float32) for one in samples]
+            nothing = [np.zeros((one, 1), dtype=np.float32) for one in samples_of(problem)]
             profiles.setdefault(key, [None] * len(problem.runs))[r] = profile
             scaled = np.where(problem.mask[r], moved.get(key, profile) / problem.noise[r], 0.0)
             columns.setdefault(key, nothing)[r] = thin(scaled[:, :, None])
-        windows += _windows(problem, fit, r, samples, power, lost, rise, loss_w_per_k, typical)
+        windows += _windows(problem, fit, r, power, lost, rise, loss_w_per_k, typical)
     everywhere = [Cause(*key, tuple(profiles[key]), np.concatenate(parts)) for key, parts in columns.items()]
     return everywhere + windows + [one for every in EVERY for one in _often(windows, every)]
 
@@ -186,7 +202,8 @@ def _often(windows: Sequence[Cause], every: int) -> list[Cause]:
     for (kind, text), parts in together.items():
         bumps, columns = [], []
         for one in parts:
-            run, profile = next((r, p) for r, p in enumerate(one.profiles) if p is not None)
+            run = one.run
+            profile = one.profiles[run]
             tops = [*one.edges[:-1:every], one.edges[-1]]
             times = [2 * tops[0] - tops[1], *tops, 2 * tops[-1] - tops[-2]]
             about = list(zip(times, times[1:], times[2:], strict=False))
@@ -203,7 +220,8 @@ def _often(windows: Sequence[Cause], every: int) -> list[Cause]:
     return out
 
 
-def _only(k: int, values: np.ndarray, springs: int) -> np.ndarray:
+def only(k: int, values: np.ndarray, springs: int) -> np.ndarray:
+    """Return values (rows,) at one spring, 0 at all others, (rows, springs)."""
     out = np.zeros((len(values), springs))
     out[:, k] = values
     return out
@@ -222,13 +240,13 @@ def _everywhere(
             apart = max(abs(a - b) for a, b in zip(place[j], place[k], strict=True))
             if j == k or (springs > 16 and apart > 2):
                 continue
-            out["crosstalk", f"the drive of spring {j + 1} also heats spring {k + 1}"] = _only(k, power[:, j], springs)
-            seen = _only(k, shown[:, j] - shown[:, k], springs)
+            out["crosstalk", f"the drive of spring {j + 1} also heats spring {k + 1}"] = only(k, power[:, j], springs)
+            seen = only(k, shown[:, j] - shown[:, k], springs)
             out["mixing", f"thermometer {k + 1} also sees spring {j + 1}"] = seen
             if j < k and apart > 1:
                 flow = over[:, j] - over[:, k]
                 text = f"springs {j + 1} and {k + 1} are joined, though no neighbours"
-                out["bridge", text] = _only(k, flow, springs) - _only(j, flow, springs)
+                out["bridge", text] = only(k, flow, springs) - only(j, flow, springs)
     for words, step in (("above", (1, 0)), ("below", (-1, 0)), ("to the left", (0, 1)), ("to the right", (0, -1))):
         warmed = np.zeros_like(power)
         for k, (row, col) in enumerate(place):
@@ -248,17 +266,17 @@ def _everywhere(
     out["pickup", "each thermometer shows its spring's current"] = amperes
     out["pickup", "each thermometer shows its spring's power"] = power / max(1e-12, float(power.mean()))
     for k in range(springs):
-        out["trend", f"the loss of spring {k + 1} changes over the run"] = _only(k, -lost[:, k] * ramp, springs)
-        out["trend", f"the drive of spring {k + 1} changes over the run"] = _only(k, power[:, k] * ramp, springs)
-        out["reading", f"thermometer {k + 1} drifts"] = _only(k, ramp, springs)
-        out["heat", f"spring {k + 1} is given heat all the time"] = _only(k, np.ones_like(ramp), springs)
+        out["trend", f"the loss of spring {k + 1} changes over the run"] = only(k, -lost[:, k] * ramp, springs)
+        out["trend", f"the drive of spring {k + 1} changes over the run"] = only(k, power[:, k] * ramp, springs)
+        out["reading", f"thermometer {k + 1} drifts"] = only(k, ramp, springs)
+        out["heat", f"spring {k + 1} is given heat all the time"] = only(k, np.ones_like(ramp), springs)
         if springs > 1:
-            out["pickup", f"thermometer {k + 1} shows its spring's current"] = _only(k, amperes[:, k], springs)
+            out["pickup", f"thermometer {k + 1} shows its spring's current"] = only(k, amperes[:, k], springs)
     return out
 
 
 @dataclass(frozen=True)
-class _Stepwise:
+class Stepwise:
     """What may begin and end at some rows of one run, as columns of all readings."""
 
     run: int
@@ -270,17 +288,17 @@ class _Stepwise:
     samples: tuple[int, ...]
 
     @staticmethod
-    def of(problem: Problem, r: int, samples: Sequence[int]) -> _Stepwise | None:
-        """Return it for one run; None where that has too few rows."""
+    def of(problem: Problem, r: int, most: int | None = None) -> Stepwise | None:
+        """Return it for one run, at so many edges at `most`; None where that has too few rows."""
         run = problem.runs[r]
         rows, springs = run.temperature_c.shape
         step = float(np.median(np.diff(run.time_s)))
-        grid = max(1, round(GRID_S / step), -(-rows // min(EDGES, max(8, STEPS // springs))))
+        grid = max(1, round(GRID_S / step), -(-rows // (most or min(EDGES, max(8, STEPS // springs)))))
         edges = np.arange(0, rows, grid)
         if len(edges) < 4:
             return None
         ends = (*(int(edge) for edge in edges), rows)
-        return _Stepwise(r, len(problem.runs), problem.mask[r], problem.noise[r], edges, ends, tuple(samples))
+        return Stepwise(r, len(problem.runs), problem.mask[r], problem.noise[r], edges, ends, samples_of(problem))
 
     def thinned(self, block: np.ndarray) -> np.ndarray:
         """Return fields (edges, rows, springs), K, as columns (samples, edges)."""
@@ -302,17 +320,16 @@ class _Stepwise:
         text = f"thermometer {k + 1} shows more of its spring's rise"
         # of the fit's own rise: a part of the readings would explain all that they show
         return [
-            self.cause("sensor", f"thermometer {k + 1} jumps", _only(k, np.ones(rows), springs), self.thinned(jumps)),
-            self.cause("share", text, _only(k, rise[:, k], springs), self.thinned(jumps * rise)),
+            self.cause("sensor", f"thermometer {k + 1} jumps", only(k, np.ones(rows), springs), self.thinned(jumps)),
+            self.cause("share", text, only(k, rise[:, k], springs), self.thinned(jumps * rise)),
         ]
 
 
 def of_thermometers(problem: Problem, fit: Fit) -> list[Cause]:
     """Return what single thermometers may show that their springs do not, in a window of one run: a simulation a run."""
-    samples = [len(range(0, len(mask), THIN)) * mask.shape[1] for mask in problem.mask]
     out = []
     for r, run in enumerate(problem.runs):
-        if (into := _Stepwise.of(problem, r, samples)) is not None:
+        if (into := Stepwise.of(problem, r)) is not None:
             rise = risen(problem, fit, r)
             out += [one for k in range(run.springs) for one in into.of_thermometer(k, rise)]
     return out
@@ -330,7 +347,6 @@ def _windows(
     problem: Problem,
     fit: Fit,
     r: int,
-    samples: Sequence[int],
     power: np.ndarray,
     lost: np.ndarray,
     rise: np.ndarray,
@@ -338,7 +354,7 @@ def _windows(
     typical_w: float,
 ) -> list[Cause]:
     """Return what may begin and end in one run: heat, drives, losses and thermometers, each in steps at the edges."""
-    into = _Stepwise.of(problem, r, samples)
+    into = Stepwise.of(problem, r)
     if into is None:
         return []
     edges, ends, cause = into.edges, into.ends, into.cause
@@ -361,8 +377,8 @@ def _windows(
         warmer += shaped(k, loss_w_per_k)
         driven = shaped(k, power[:, k])
         everything_driven += driven
-        out.append(cause("contact", f"the drive of spring {k + 1} changes", _only(k, power[:, k], springs), driven))
-        out.append(cause("heat", f"spring {k + 1} is given heat", _only(k, one, springs), steps[k]))
+        out.append(cause("contact", f"the drive of spring {k + 1} changes", only(k, power[:, k], springs), driven))
+        out.append(cause("heat", f"spring {k + 1} is given heat", only(k, one, springs), steps[k]))
         out += into.of_thermometer(k, rise)
     out.append(cause("gust", "all losses change", -lost, everything_lost))
     out.append(cause("surroundings", "the surroundings are warmer", np.outer(loss_w_per_k, np.ones(springs)), warmer))

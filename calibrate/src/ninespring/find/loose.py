@@ -24,9 +24,8 @@ from ..model.effects.effect import sized
 from .causes import SHORTEST, Cause, column_of, library, of_thermometers, risen, typical_power
 from .evidence import likelihood
 from .lasting import likeliest
+from .pursuit import Pursuit
 from .unnamed import LEAST_NATS, SHARE, STEPS_OF_FIT, Hidden, laid_bare
-from .windows import LEAST_LEFT, powers, products
-from .windows import best as most
 
 MOST = 4
 """Windows that are left out, one after the other, at most: where more would help, the model is wrong, not the thermometers."""
@@ -145,76 +144,32 @@ def _window(problem: Problem, final: Fit) -> tuple[Hidden, Fit, np.ndarray | Non
         bare = _slopes(problem, fit) if turn or fit.jacobian is None else fit
         basis, left = laid_bare(problem, bare)
         beyond = max(1e-12, float(left @ left) - len(left))
-        drop, cause, span = max(
-            (_best(one, basis, left) for one in of_thermometers(problem, bare)), key=lambda one: one[0], default=_NONE
-        )
-        if cause is None or drop < SHARE * beyond:
+        # not all of a run, which may be another run's offset, nor a part more of the rise: how much, only numbers that it has not spoilt tell
+        one = Pursuit(of_thermometers(problem, bare), basis, SHORTEST, {"share": -1}).best(left, rests=SHORTEST)
+        if one is None or one.drop < SHARE * beyond:
             return None
         if turn == 0:
-            most_of_others, other = _of_others(problem, bare, basis, left)
-            if drop <= most_of_others:
+            other = Pursuit(_others(problem, bare), basis, SHORTEST).best(left)
+            if one.drop <= other.drop:
                 return None
-            if other is not None:
-                rival = column_of(problem, bare, other[0], typical_power(problem, bare), *other[1])
-        if found is not None and (found.cause.text, found.rows) == (cause.text, span):
+            rival = column_of(problem, bare, other.cause, typical_power(problem, bare), *other.rows)
+        if found is not None and (found.cause.text, found.rows) == (one.cause.text, one.rows):
             break
-        found = Hidden(cause, cause.text, span, column_of(problem, bare, cause, 1.0, *span))
+        found = Hidden(one.cause, one.cause.text, one.rows, column_of(problem, bare, one.cause, 1.0, *one.rows))
         fit = _beside(problem, bare, found.column)
     return None if found is None else (found, fit, rival)
 
 
-_NONE: tuple[float, Cause | None, tuple[int, int]] = (0.0, None, (0, 0))
-
-
-def _best(cause: Cause, basis: np.ndarray, left: np.ndarray) -> tuple[float, Cause | None, tuple[int, int]]:
-    """Return what the best window of a thermometer's cause explains, and that: not all of a run, which may be another run's offset, nor
-    a part more of the rise."""
-    gram, moment = products(cause.columns, basis), np.append(cause.columns.T @ left, 0.0)
-    power, of_all = powers(gram), powers((cause.columns.T @ cause.columns).astype(float))
-    count = len(gram)
-    moments = moment[:count, None] - moment[None, :]
-    size = moments / np.maximum(power, 1e-9)
-    long = np.arange(count + 1)[None, :] - np.arange(count)[:, None]
-    possible = (long >= SHORTEST) & (long <= count - SHORTEST) & (power > LEAST_LEFT * of_all) & (power > 1e-6)
-    if cause.kind == "share":
-        possible &= size < 0.0  # how much of it, only numbers that it has not spoilt can tell
-    gain = np.where(possible, moments * size, 0.0)
-    a, b = np.unravel_index(int(np.argmax(gain)), gain.shape)
-    return float(gain[a, b]), cause, (cause.edges[a], cause.edges[b])
-
-
-def _of_others(
-    problem: Problem, fit: Fit, basis: np.ndarray, left: np.ndarray
-) -> tuple[float, tuple[Cause, tuple[int, int | None]] | None]:
-    """Return what the best of all other causes without a name explains, for a while or all the time, and that."""
-    best: tuple[float, tuple[Cause, tuple[int, int | None]] | None] = (0.0, None)
-    for one in library(problem, fit):
-        alone = one.kind in ("sensor", "share") and _spring_of(one) is not None
-        if alone or one.bumps:
-            continue
-        if one.edges:
-            of_all = powers((one.columns.T @ one.columns).astype(float))
-            drop, a, b = most(one.columns.T @ left, products(one.columns, basis), SHORTEST, of_all)
-            best = max(best, (drop, (one, (one.edges[a], one.edges[b]))), key=lambda it: it[0])
-            continue
-        column = one.columns[:, 0] - basis @ (basis.T @ one.columns[:, 0])
-        if float(column @ column) > LEAST_LEFT * float(one.columns[:, 0] @ one.columns[:, 0]):
-            gain_of_it = float(column @ left) ** 2 / float(column @ column)
-            best = max(best, (gain_of_it, (one, (0, None))), key=lambda it: it[0])
-    return best
-
-
-def _spring_of(cause: Cause) -> int | None:
-    """Return the spring, from 0, whose thermometer alone a cause is of."""
-    springs = {int(k) for profile in cause.profiles if profile is not None for k in np.flatnonzero(profile.any(axis=0))}
-    return springs.pop() if len(springs) == 1 else None
+def _others(problem: Problem, fit: Fit) -> list[Cause]:
+    """Return all causes without a name but single thermometers' and what comes and goes."""
+    alone = ("sensor", "share")
+    return [one for one in library(problem, fit) if not one.bumps and not (one.kind in alone and one.place >= 0)]
 
 
 def _at_its_step(problem: Problem, fit: Fit, window: Hidden) -> Loose:
     """Return a window with its ends where the readings step, and as late as they do."""
     cause = window.cause
-    r = next(number for number, profile in enumerate(cause.profiles) if profile is not None)
-    k = _spring_of(cause) or 0
+    r, k = cause.run, cause.place
     run, shape = problem.runs[r], cause.profiles[r]
     assert shape is not None
     rows, grid = len(run.time_s), cause.edges[1] - cause.edges[0]

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -20,11 +21,10 @@ from ..infer.fit import Fit
 from ..infer.heat import THIN, power_of, step_answers, thin
 from ..infer.problem import Problem
 from ..io import results
-from . import windows
+from .causes import Cause, Stepwise, only
 from .evidence import fit_factor
+from .pursuit import Choice, Pursuit, steps_up
 
-GRID_S = 15.0
-"""Times at which a piece may begin or end: half of what an event's place in time is told to."""
 SHORTEST_S = 45.0
 """A piece is at least this long: shorter ones are no heat that a spring would show."""
 MOST = 12
@@ -123,52 +123,44 @@ def _events_of(
 ) -> list[results.Event]:
     """Return the pieces of one run: chosen one by one, the best first, all sizes fitted again with each."""
     run, mask, noise = problem.runs[r], problem.mask[r], problem.noise[r]
-    springs, rows = run.springs, len(run.time_s)
-    step = float(np.median(np.diff(run.time_s)))
-    grid = max(1, round(GRID_S / step), -(-rows // EDGES))
-    edges = np.arange(0, rows, grid)
-    if len(edges) < 4:
+    if (into := Stepwise.of(problem, r, EDGES)) is None:
         return []
+    rows, springs = run.temperature_c.shape
+    edges = into.edges
+    grid = int(edges[1])
+    step = float(np.median(np.diff(run.time_s)))
     answers = step_answers(problem, fit, r, edges, typical_w)
-    kinds: list[tuple[results.Unknown, int]] = [("heat", k) for k in range(springs)]
-    kinds += [("sensor", k) for k in range(springs)]
+
+    def piece(kind: results.Unknown, k: int, block: np.ndarray) -> Cause:
+        """Return what a unit step at a spring, -1: at all, adds to the readings (edges, rows, springs) from each edge on."""
+        profile = np.ones(block.shape[1:]) if k < 0 else only(k, np.ones(rows), springs)
+        return Cause(kind, "", (profile,), into.thinned(block), into.ends)
+
+    pieces = [piece("heat", k, answers.pop(("heat", k))) for k in range(springs)]
+    pieces += [piece("sensor", k, steps_up(edges, rows, springs, k)) for k in range(springs)]
     if springs > 1:
-        kinds.append(("common", -1))
-
-    def thinned(fields: np.ndarray) -> np.ndarray:
-        """Return fields (edges, rows, springs) as columns (samples, edges), in units of the noise."""
-        return thin(np.moveaxis(np.where(mask, fields / noise, 0.0), 0, 2))
-
-    def columns_of(kind: str, k: int) -> np.ndarray:
-        """Return what a unit step that begins at each edge adds to the readings, (samples, edges)."""
-        if kind != "sensor":
-            return thinned(answers.pop((kind, k)))
-        return thinned(windows.steps_up(edges, rows, springs, k))
-
+        pieces.append(piece("common", -1, answers.pop(("common", -1))))
     used = slopes[:, np.linalg.norm(slopes, axis=0) > 1e-6] if slopes.size else slopes
     spread_out = np.zeros((*mask.shape, used.shape[1]))
     spread_out[mask] = used
     basis = np.linalg.qr(thin(spread_out))[0] if used.shape[1] else np.zeros((-(-rows // THIN) * springs, 0))
-    left = thinned(problem.without_errors(fit.residual)[r][None])[:, 0].astype(float)
+    left = into.thinned(problem.without_errors(fit.residual)[r][None])[:, 0].astype(float)
     left = left - basis @ (basis.T @ left)
-    steps = {one: columns_of(*one) for one in kinds}
-    grams = {one: windows.products(block, basis) for one, block in steps.items()}
-    chosen: list[tuple[results.Unknown, int, int, int]] = []
-    columns: list[np.ndarray] = []
     shortest = max(1, round(SHORTEST_S / (grid * step)))
-    tried = len(kinds) * len(edges) ** 2 / 2
+    among = Pursuit(pieces, basis, shortest, least_left=0.0)
+    chosen: list[Choice] = []
+    columns: list[np.ndarray] = []
+    tried = len(pieces) * len(edges) ** 2 / 2
     rest, sizes, gains = left, np.zeros(0), []
     while len(chosen) < MOST:
-        found = ((windows.best(steps[one].T @ rest, grams[one], shortest), one) for one in kinds)
-        (gain, a, b), (kind, k) = max(found, key=lambda one: one[0][0])
+        if (best := among.best(rest)) is None:
+            break
         # what it gains, in nats, correlated samples counted for what they are, less the price of its choice
-        nats = 0.5 * gain / factor - math.log(tried)
+        nats = 0.5 * best.drop / factor - math.log(tried)
         if nats < 0.5 * math.log(max(2.0, len(left) / factor)):
             break
-        vector = steps[kind, k][:, a] - (steps[kind, k][:, b] if b < len(edges) else 0.0)
-        vector = vector - basis @ (basis.T @ vector)
-        chosen.append((kind, k, a, b))
-        columns.append(vector)
+        chosen.append(best)
+        columns.append(best.vector - basis @ (basis.T @ best.vector))
         gains.append(nats)
         matrix = np.column_stack(columns)
         sizes = np.linalg.lstsq(matrix, left, rcond=None)[0]
@@ -181,8 +173,9 @@ def _events_of(
     out = []
     since = [float(run.time_s[row] - run.time_s[0]) for row in (*edges, -1)]
     shown = problem.without_errors(fit.residual)[r]
-    sensors = [(k, a, b, float(size)) for (kind, k, a, b), size in zip(chosen, sizes, strict=True) if kind == "sensor"]
-    for (kind, k, a, b), size, error, nats in zip(chosen, sizes, errors, gains, strict=True):
+    told = [(cast(results.Unknown, one.cause.kind), one.cause.place, *one.edges) for one in chosen]
+    sensors = [(k, a, b, float(size)) for (kind, k, a, b), size in zip(told, sizes, strict=True) if kind == "sensor"]
+    for (kind, k, a, b), size, error, nats in zip(told, sizes, errors, gains, strict=True):
         span_s = (since[a], since[b])
         small = abs(size) < (SMALLEST * typical_w if kind != "sensor" else 3.0 * float(noise[k]))
         if small or abs(size) < 3.0 * error:

@@ -23,9 +23,9 @@ from ..io.statistics import correlation_factor
 from ..model.effects.effect import sized
 from ..model.spec import RUNS_OWN
 from . import evidence
-from . import windows as windows_of
 from .causes import SHORTEST, Cause, bump, column_of, library, thinned, typical_power
 from .evidence import fit_factor, unexplained
+from .pursuit import Pursuit, products, take
 from .search import MIN_GAIN, MIN_SHARE, Search
 
 KINDS = 500
@@ -162,46 +162,27 @@ def find(
     typical = typical_power(problem, fit)
     found = list(already)
     samples = problem.count / fit_factor(problem, fit)
-    single = [one for one in kinds if not one.edges and not one.bumps]
     # two that come and go as they like would explain whatever all springs do together, and leave nothing to be named
     often = [] if any(one.cause.bumps for one in already) else [one for one in kinds if one.bumps]
     # and one at a spring alone would explain whatever is named of that spring
     springs = {_spring_of(fit, effect) for effect in fit.spec.effects}
-    often = [one for one in often if _place(one) not in springs]
-    windows = [one for one in kinds if one.edges]
-    matrix = np.column_stack([one.columns[:, 0] for one in single])
-    either = np.array([one.kind not in GIVES_ONLY for one in single])
-    named = np.array([one.kind == NAMED for one in single])
-    whole = (matrix**2).sum(axis=0)
-    power = whole - ((basis.T @ matrix) ** 2).sum(axis=0)
-    grams = [windows_of.products(one.columns, basis) for one in windows]
+    often = [one for one in often if one.place not in springs]
+    among = Pursuit([one for one in kinds if not one.bumps], basis, SHORTEST, dict.fromkeys(GIVES_ONLY, 1))
+    named = np.array([one.kind == NAMED for one in among.single], dtype=bool)
     often_grams: list[np.ndarray] = []
-    powers = [windows_of.powers((one.columns.T @ one.columns).astype(float)) for one in windows]
-    tried = len(single) + sum(one.columns.shape[1] ** 2 / 2 for one in windows)
+    tried = len(among.single) + sum(one.columns.shape[1] ** 2 / 2 for one in among.windows)
     while len(found) < most:
-        moment = matrix.T @ left
-        possible = (power > windows_of.LEAST_LEFT * whole) & (either | (moment > 0))
-        gain = np.where(possible, moment**2 / np.maximum(power, 1e-12), 0.0)
-        names = float(gain[named].max(initial=0.0))
-        k = int(np.argmax(np.where(named, 0.0, gain)))
-        span: tuple[int, int | None] = (0, None)
-        drop, vector, best = float(gain[k]), matrix[:, k], single[k]
-        for one, gram, of_all in zip(windows, grams, powers, strict=True):
-            if _within(one, found):
-                continue
-            value, a, b = windows_of.best(one.columns.T @ left, gram, SHORTEST, of_all)
-            if value > drop:
-                vector = one.columns[:, a] - (0.0 if b == len(gram) else one.columns[:, b])
-                drop, best, span = value, one, (one.edges[a], one.edges[b])
-        if len(found) > searched and names > drop:
+        choice = among.best(left, lambda one: one.kind == NAMED or _within(one, found))
+        drop, best, span, vectors, spent = choice.drop, choice.cause, choice.rows, choice.vector[:, None], 1
+        if len(found) > searched and among.gains(left)[named].max(initial=0.0) > drop:
             break
         rest = float(left @ left)
         nats = _nats(samples, rest, rest - drop, 1) - math.log(tried)
-        vectors, spent, independent = vector[:, None], 1, samples
+        independent = samples
         # the half that one window leaves may be many more like it, and one where another was found says that there are more
         many = drop < 0.5 * (rest - len(left)) or any(one.cause.text == best.text and best.edges for one in found)
         if many and not often_grams:
-            often_grams = [windows_of.products(one.columns, basis) for one in often]
+            often_grams = [products(one.columns, basis) for one in often]
         for one, gram in zip(often, often_grams, strict=True) if many else ():
             moment = one.columns.T @ left
             size, numbers = _least_squares(gram, moment)
@@ -216,7 +197,7 @@ def find(
             break
         text = best.text
         if best.edges:
-            run = problem.runs[next(r for r, one in enumerate(best.profiles) if one is not None)]
+            run = problem.runs[best.run]
             when = [float(run.time_s[min(row, len(run.time_s) - 1)] - run.time_s[0]) for row in span]
             text = text.format(f"{when[0]:.0f} to {when[1]:.0f} s")
         if any(text == one.text for one in found):
@@ -228,10 +209,9 @@ def find(
         units = np.linalg.qr(vectors[:, np.linalg.norm(vectors, axis=0) > 1e-3])[0]
         left = left - units @ (units.T @ left)
         basis = np.column_stack([basis, units])
-        power = power - ((units.T @ matrix) ** 2).sum(axis=0)
-        for one, gram in zip([*windows, *often], [*grams, *often_grams], strict=False):
-            inside = units.T @ one.columns
-            gram -= inside.T @ inside
+        among.take(units)
+        for one, gram in zip(often, often_grams, strict=False):
+            take(units, one, gram)
     return found
 
 
@@ -394,8 +374,8 @@ def _or_lasting(problem: Problem, found: Search, result: Found, hidden: list[Hid
     """
     final, without = result[0], result[1]
     before = problem.unnamed
-    for spring in sorted({_place(one.cause) for one in hidden if one.cause.edges} - {-1}):
-        begun = [one for one in hidden if one.cause.edges and _place(one.cause) == spring]
+    for spring in sorted({one.cause.place for one in hidden if one.cause.edges} - {-1}):
+        begun = [one for one in hidden if one.cause.edges and one.cause.place == spring]
         doubted = [
             effect
             for effect in without
@@ -425,8 +405,7 @@ def _undone(problem: Problem, fit: Fit, effect: str, begun: Sequence[Hidden], sp
     bare = problem.predictions_without(fit, effect)
     there = [np.zeros_like(mask) for mask in problem.mask]
     for one in begun:
-        r = next(r for r, profile in enumerate(one.cause.profiles) if profile is not None)
-        there[r][slice(*one.rows), spring] = True
+        there[one.cause.run][slice(*one.rows), spring] = True
     here = np.concatenate([rows[mask] for rows, mask in zip(there, problem.mask, strict=True)])
     full = problem.predictions(fit.spec, fit.values)
     shows = np.concatenate(problem.scaled([a - b for a, b in zip(full, bare, strict=True)]))[here]
@@ -442,15 +421,9 @@ def _spring_of(fit: Fit, effect: str) -> int | None:
     return int(one[:-1]) - 1 if one else None
 
 
-def _place(cause: Cause) -> int:
-    """Return the spring, from 0, at which alone a cause acts; -1 where at several."""
-    there = {int(k) for profile in cause.profiles if profile is not None for k in np.flatnonzero(profile.any(axis=0))}
-    return there.pop() if len(there) == 1 else -1
-
-
 def _all_the_time(problem: Problem, one: Hidden) -> Hidden:
     """Return a cause that begins and ends in a run as one that is there all of it."""
-    run = next(run for run, profile in zip(problem.runs, one.cause.profiles, strict=True) if profile is not None)
+    run = problem.runs[one.cause.run]
     return replace(one, text=one.cause.text.format(f"0 to {run.duration_s:.0f} s"), rows=(0, None), inside=None)
 
 
