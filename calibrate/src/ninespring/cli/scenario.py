@@ -7,13 +7,12 @@ from pathlib import Path
 import click
 
 from ..errors import InputError
+from ..export.settings import FIRMWARE_EFFECTS
 from ..io import ranges
 from ..model.models import Model, pattern_of, read_model
 from ..model.simulate import array_parameters, board_settings
 from .console import MODEL, beside, command, number, output, write
 
-ALWAYS = ("latent_heat", "resistance_phase")
-"""What every NiTi spring does, whether a model was fitted where it shows or not."""
 LONGEST = 190
 """Characters of a line of a scenario, nearly."""
 
@@ -48,7 +47,8 @@ def scenario_text(model: Model, on: list[bool], pattern: str, fan: int, duration
     """Return scenario.ini: the model's plant under boards that are told its numbers."""
     array = model.array
     shifted = ("transformation_shift",) if (array.stiffness or {}).get("transformation_shift_k") else ()
-    effects = dict.fromkeys((*model.effects, *ALWAYS, *shifted))
+    # what every NiTi spring does, whether a model was fitted where it shows or not
+    effects = dict.fromkeys((*model.effects, *FIRMWARE_EFFECTS, *shifted))
     lines = ["[scenario]", f"duration_s = {duration_s:g}", "policy = precompensate", "[array]"]
     lines += [f"rows = {array.rows}", f"cols = {array.cols}"]
     lines += ["layers = 2"] if array.layers == 2 else []

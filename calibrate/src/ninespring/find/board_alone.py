@@ -48,8 +48,8 @@ def changed_contacts(problem: from_resistance.Resistances, fit: Fit) -> list[con
         cold = colder(problem, fit, hot_c)[here]
         at = springs, np.full(len(ohm), r), run.time_s[rows]
         parts.append((ohm, *at, phase, hot_c[here] - REFERENCE_C, noise, cold))
-    read = Readings(*(np.concatenate([part[n] for part in parts]) for n in range(8)))
-    columns = {f"own {k}": (read.spring == k).astype(float) for k in np.unique(read.spring)}
+    read = Readings.joined(parts)
+    columns = read.own()
     # beside what else a fit may have wrong of resistances
     columns["rise martensite"] = read.over_k * (1.0 - read.phase)
     if (read.phase > 0.5).any():

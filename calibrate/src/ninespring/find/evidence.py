@@ -34,7 +34,12 @@ def log_evidence(problem: Problem, better: Fit, other: Fit) -> float:
 def relief(better: Fit, other: Fit) -> float:
     """Return the nats for `better` that no reading tells: random effects that need not lie so far apart, less the price of its numbers."""
     k = len(better.spec.free) - len(better.stuck) - (len(other.spec.free) - len(other.stuck))
-    return strain(other, better) - strain(better, other) - 0.5 * k * math.log(max(2, better.count))
+    return strain(other, better) - strain(better, other) - price(k, better.count)
+
+
+def price(numbers: float, samples: float) -> float:
+    """Return the nats that so many numbers must be worth, by so many independent samples: half their logarithm each (BIC)."""
+    return 0.5 * numbers * math.log(max(2.0, samples))
 
 
 def strain(fit: Fit, beside: Fit) -> float:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from ..infer.fit import Fit
 from ..infer.problem import Problem
-from .evidence import likelihood
+from .evidence import likelihood, price
 from .search import Search
 from .unnamed import Found, Hidden
 
@@ -60,5 +60,5 @@ def likeliest(problem: Problem, fit: Fit) -> Fit:
 def nats_beside(problem: Problem, fit: Fit, hidden: Sequence[Hidden], chosen_from: int) -> float:
     """Return the logarithm of a fit's likelihood, causes without a name beside it paid for: their numbers, and the choice."""
     numbers = sum(one.column.shape[1] for one in hidden) + len(fit.spec.free) - len(fit.stuck)
-    price = 0.5 * numbers * math.log(max(2, fit.count)) + len(hidden) * math.log(max(1, chosen_from))
-    return likelihood(problem, fit) - price
+    paid = price(numbers, fit.count) + len(hidden) * math.log(max(1, chosen_from))
+    return likelihood(problem, fit) - paid

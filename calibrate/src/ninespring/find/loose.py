@@ -20,12 +20,11 @@ from ..infer.likelihood import Rows, fitted
 from ..infer.problem import Problem
 from ..io import results
 from ..io.logs.run import Run
-from ..model.effects.effect import sized
 from .causes import SHORTEST, Cause, column_of, library, of_thermometers, risen, typical_power
 from .evidence import likelihood
 from .lasting import likeliest
 from .pursuit import Pursuit
-from .unnamed import LEAST_NATS, SHARE, STEPS_OF_FIT, Hidden, laid_bare
+from .unnamed import LEAST_NATS, SHARE, Hidden, beside, laid_bare, told
 
 MOST = 4
 """Windows that are left out, one after the other, at most: where more would help, the model is wrong, not the thermometers."""
@@ -68,17 +67,8 @@ class Loose:
     def told(self) -> results.Unnamed:
         """Return what diagnosis.json says of it."""
         when = f"{self.since_s[0]:.0f} to {self.since_s[1]:.0f} s of run {self.run + 1}"
-        if self.kind == "share":
-            what, said = "shows less of its spring's rise", sized(-self.size, self.error, "%", 100.0)
-        else:
-            what, said = "jumps", sized(self.size, self.error, "K")
-        return results.Unnamed(
-            kind=self.kind,
-            size=self.size,
-            stderr=self.error,
-            unit="1" if self.kind == "share" else "K",
-            text=f"thermometer {self.spring + 1} {what}, {when}: {said}; {LEFT_OUT}",
-        )
+        what = "shows more of its spring's rise" if self.kind == "share" else "jumps"
+        return told(self.kind, f"thermometer {self.spring + 1} {what}, {when}", self.size, self.error, f"; {LEFT_OUT}")
 
 
 def without(run: Run, number: int, left_out: Sequence[Loose]) -> Run:
@@ -99,27 +89,19 @@ def find(problem: Problem, final: Fit) -> Loose | None:
     chosen_from = math.log(problem.count * len(LATE_S))
     if _nats_of_steps(problem, fit, at_step) - chosen_from < LEAST_NATS:
         return None  # heat that wanders bends there, and makes none
-    beside = _beside(problem, fit, _column(problem, at_step))
-    off, left = (max(0.0, one.sse - one.count) for one in (final, beside))
+    again = beside(problem, fit, _column(problem, at_step))
+    off, left = (max(0.0, one.sse - one.count) for one in (final, again))
     if off - left < SHARE * off:
         return None
-    nats = _nats(problem, beside, _column(problem, at_step))
+    nats = _nats(problem, again, _column(problem, at_step))
     whole = column_of(problem, fit, window.cause, 1.0)
-    without = max(_nats(problem, final, None), _nats(problem, _beside(problem, fit, whole), whole))
+    without = max(_nats(problem, final, None), _nats(problem, beside(problem, fit, whole), whole))
     if nats - chosen_from - without < LEAST_NATS:
         return None
     # chosen from about as many
-    if rival is not None and nats <= _nats(problem, _beside(problem, final, rival), rival):
+    if rival is not None and nats <= _nats(problem, beside(problem, final, rival), rival):
         return None
     return at_step
-
-
-def _beside(problem: Problem, fit: Fit, column: np.ndarray) -> Fit:
-    """Return a fit's model fitted beside what a column (count, 1) can explain; nothing is taken out when this returns."""
-    problem.leave_out(column)
-    out = problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
-    problem.leave_out(None)
-    return out
 
 
 def _nats(problem: Problem, fit: Fit, column: np.ndarray | None) -> float:
@@ -156,7 +138,7 @@ def _window(problem: Problem, final: Fit) -> tuple[Hidden, Fit, np.ndarray | Non
         if found is not None and (found.cause.text, found.rows) == (one.cause.text, one.rows):
             break
         found = Hidden(one.cause, one.cause.text, one.rows, column_of(problem, bare, one.cause, 1.0, *one.rows))
-        fit = _beside(problem, bare, found.column)
+        fit = beside(problem, bare, found.column)
     return None if found is None else (found, fit, rival)
 
 

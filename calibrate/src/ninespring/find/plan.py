@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..export.settings import CROSSED, best_plant
+from ..export.settings import CROSSED, FIRMWARE_EFFECTS, best_plant
 from ..io import ranges, results
 from ..model import native
 from ..model.models import Array, Model
@@ -139,12 +139,12 @@ def plan_experiment(
     at = np.searchsorted([one.at_s for one in steps], time_s, "right") - 1
     fan = np.array([one.fan for one in steps])[at] / 100.0
     full_a = min(full_a, supply_a / max(percent.sum(axis=1).max() / 100.0, 1e-9))
-    temperature = _temperatures(_declared(array), percent[at] / 100.0 * full_a, fan)
-    while temperature.max() > hottest_c:
+    drive, plant = percent[at] / 100.0 * full_a, _declared(array)
+    while (hottest := float(_temperatures(plant, drive, fan).max())) > hottest_c:
         if full_a < LEAST_A:
             raise InputError(f"this experiment gets hotter than {hottest_c:g} degC with any current")
         full_a *= BACK_OFF
-        temperature = _temperatures(_declared(array), percent[at] / 100.0 * full_a, fan)
+        drive = percent[at] / 100.0 * full_a
     lines = [*whole_springs(array), "policy open", f"$open_current_a={full_a:.3f}", "off all", "fan 0"]
     before, blows = np.zeros(array.springs), 0
     for one in steps:
@@ -154,8 +154,7 @@ def plan_experiment(
             level = one.percent[k]
             lines.append(f"{stamp}on {k + 1} {level}" if level else f"{stamp}off {k + 1}")
         before, blows = np.array(one.percent), one.fan
-    drive = percent[at] / 100.0 * full_a
-    return Plan(lines, float(temperature.max()), float(drive.sum(axis=1).max()), (drive > 0).mean(axis=0))
+    return Plan(lines, hottest, float(drive.sum(axis=1).max()), (drive > 0).mean(axis=0))
 
 
 def plan_through(model: Model, spring: int, supply_a: float, hottest_c: float) -> Plan:
@@ -245,7 +244,7 @@ def _simulated(
 def _declared(array: Array) -> native.Plant:
     plant = native.Plant(array.rows, array.cols)
     plant.set_all(array_parameters(array))
-    plant.set_effects(["latent_heat", "resistance_phase"])
+    plant.set_effects(FIRMWARE_EFFECTS)
     return plant
 
 

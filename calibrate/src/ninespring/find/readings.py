@@ -5,7 +5,7 @@ A reading counts where the spring is driven and settled in one phase; how hot it
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from ..io import statistics
 from ..io.logs.mending import RUN_IN_S
 from ..io.logs.run import Run
 from ..model.simulate import simulate_run
+from .evidence import price
 
 REFERENCE_C = 20.0
 """Temperature of the declared resistances."""
@@ -50,6 +51,15 @@ class Readings:
     """Of each row, ohm."""
     cold: np.ndarray
     """Which are below the martensite's finish: there a spring is martensite whatever it was, and has not begun to be else."""
+
+    @staticmethod
+    def joined(parts: Sequence[Sequence[np.ndarray]]) -> Readings:
+        """Return what parts of the readings have, each the fields in their order, as one."""
+        return Readings(*map(np.concatenate, zip(*parts, strict=True)))
+
+    def own(self) -> dict[str, np.ndarray]:
+        """Return of each spring which readings are its own, as numbers: every spring has a resistance of its own, for wires differ."""
+        return {f"own {k}": (self.spring == k).astype(float) for k in np.unique(self.spring)}
 
     def of(self, rows: np.ndarray) -> Readings:
         """Return some of the rows."""
@@ -84,9 +94,7 @@ def readings(problem: Problem, fit: Fit) -> Readings | None:
                 columns = (ohm[here, k], np.full(n, k), np.full(n, r), run.time_s[here])
                 sigma = np.hypot(noise[k], ROUNDING_V / run.current_a[here, k])
                 parts.append((*columns, traced[here, k, 1], traced[here, k, 0] - REFERENCE_C, sigma, cold[here, k]))
-    if not parts:
-        return None
-    return Readings(*(np.concatenate([part[j] for part in parts]) for j in range(8)))
+    return Readings.joined(parts) if parts else None
 
 
 def colder(problem: Problem, fit: Fit, temperature_c: np.ndarray) -> np.ndarray:
@@ -182,4 +190,4 @@ def nats_of(read: Readings, less: Linear, more: Linear) -> float:
     rho = float(rest[1:] @ rest[:-1] / max(1e-12, rest @ rest))
     alike = max(0.02, (1.0 - max(0.0, rho)) / (1.0 + max(0.0, rho)))
     gained = statistics.surprise(less.chi2, len(rest), 1.0) - statistics.surprise(more.chi2, len(rest), 1.0)
-    return alike * gained - 0.5 * (len(more.values) - len(less.values)) * math.log(max(2.0, alike * len(rest)))
+    return alike * gained - price(len(more.values) - len(less.values), alike * len(rest))

@@ -195,8 +195,7 @@ def witness(problem: Problem, fit: Fit) -> Second | None:
     if read is None:
         return None
     two_phases = bool(np.ptp(read.phase) > 0.5)
-    # every spring has a resistance of its own: wires differ; what is shared is how it changes
-    own = {f"own {k}": (read.spring == k).astype(float) for k in sorted({int(one) for one in read.spring})}
+    own = read.own()  # what is shared is how it changes
     found = _explained(read, own, two_phases)
     mean = {key: 1.0 / len(own) for key in own}
     resistances = {"resistance_martensite_ohm": mean}

@@ -22,7 +22,7 @@ from ..infer.heat import THIN, power_of, step_answers, thin
 from ..infer.problem import Problem
 from ..io import results
 from .causes import Cause, Stepwise, only
-from .evidence import fit_factor
+from .evidence import fit_factor, price
 from .pursuit import Choice, Pursuit, steps_up
 
 SHORTEST_S = 45.0
@@ -157,7 +157,7 @@ def _events_of(
             break
         # what it gains, in nats, correlated samples counted for what they are, less the price of its choice
         nats = 0.5 * best.drop / factor - math.log(tried)
-        if nats < 0.5 * math.log(max(2.0, len(left) / factor)):
+        if nats < price(1, len(left) / factor):
             break
         chosen.append(best)
         columns.append(best.vector - basis @ (basis.T @ best.vector))

@@ -24,7 +24,7 @@ from ..model.effects.effect import sized
 from ..model.spec import RUNS_OWN
 from . import evidence
 from .causes import SHORTEST, Cause, bump, column_of, library, thinned, typical_power
-from .evidence import fit_factor, unexplained
+from .evidence import fit_factor, price, unexplained
 from .pursuit import Pursuit, products, take
 from .search import MIN_GAIN, MIN_SHARE, Search
 
@@ -88,15 +88,17 @@ class Hidden:
 
     def told(self) -> results.Unnamed:
         """Return what diagnosis.json says of it."""
-        unit = UNIT.get(self.cause.kind, "1")
-        text, size = self.text, self.size
-        for more, less in LESS if size < 0.0 else ():
-            if more in text:
-                text, size = text.replace(more, less), -self.size
-        said = sized(size, self.error, unit) if unit != "1" else sized(size, self.error, "%", 100.0)
-        return results.Unnamed(
-            kind=self.cause.kind, size=self.size, stderr=self.error, unit=unit, text=f"{text}: {said}"
-        )
+        return told(self.cause.kind, self.text, self.size, self.error)
+
+
+def told(kind: str, text: str, size: float, error: float, more: str = "") -> results.Unnamed:
+    """Return what diagnosis.json says of a cause of some size and its error, with what is said where the size is positive, and `more`."""
+    unit, shown = UNIT.get(kind, "1"), size
+    for positive, negative in LESS if size < 0.0 else ():
+        if positive in text:
+            text, shown = text.replace(positive, negative), -size
+    said = sized(shown, error, unit) if unit != "1" else sized(shown, error, "%", 100.0)
+    return results.Unnamed(kind=kind, size=size, stderr=error, unit=unit, text=f"{text}: {said}{more}")
 
 
 Beside = tuple[Search, Found, list[Hidden]]
@@ -124,7 +126,7 @@ def _least_squares(gram: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, in
 
 def _nats(samples: float, before: float, after: float, numbers: int) -> float:
     """Return the evidence of so many independent samples for so many numbers by which squares fall from one sum to another."""
-    return 0.5 * samples * math.log(before / max(1e-9, after)) - 0.5 * numbers * math.log(max(2.0, samples))
+    return 0.5 * samples * math.log(before / max(1e-9, after)) - price(numbers, samples)
 
 
 def _independent(problem: Problem, left: np.ndarray) -> float:
@@ -305,7 +307,7 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
         drop = float(
             moment @ size - moment[other] @ np.linalg.pinv(gram[np.ix_(other, other)], rcond=1e-10) @ moment[other]
         )
-        nats = 0.5 * drop / spread - 0.5 * (numbers - 1) * math.log(max(2.0, problem.count / factor))
+        nats = 0.5 * drop / spread - price(numbers - 1, problem.count / factor)
         errors = np.sqrt(np.maximum(np.diag(inverse[own, own]), 0.0) * spread) / scale[own]
         value = (
             float(size[own][0] / scale[own][0])
@@ -313,6 +315,14 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
             else float(np.sqrt(np.mean((size[own] / scale[own]) ** 2)))
         )
         out.append((replace(one, size=value, error=float(np.sqrt(np.mean(errors**2)))), nats))
+    return out
+
+
+def beside(problem: Problem, fit: Fit, column: np.ndarray) -> Fit:
+    """Return a fit's model fitted beside what a column (count, 1) can explain; nothing is taken out when this returns."""
+    problem.leave_out(column)
+    out = problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
+    problem.leave_out(None)
     return out
 
 
@@ -340,11 +350,9 @@ def _with_fewer(problem: Problem, first: Search, final: Fit, kinds: Sequence[Cau
         fit = problem.with_slopes(fit)
         if not (grown := find(problem, fit, kinds, (), most=1)):
             continue
-        problem.leave_out(grown[0].column)
-        beside = problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
-        problem.leave_out(None)
-        if beside.sse < (final if best is None else best[0]).sse:
-            best = replace(beside, jacobian=None), grown
+        other = beside(problem, fit, grown[0].column)
+        if other.sse < (final if best is None else best[0]).sse:
+            best = replace(other, jacobian=None), grown
     return best
 
 
@@ -387,12 +395,12 @@ def _or_lasting(problem: Problem, found: Search, result: Found, hidden: list[Hid
         whole = [_all_the_time(problem, one).around(problem, final) for one in causes.values()]
         problem.leave_out(np.column_stack([before, *(one.column for one in whole)]), problem.heat)
         search = _beside(problem, found, hidden)
-        kept = beside = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
+        kept = with_all = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
         for effect in doubted:
             other = search.reduced(kept, effect)
             if other.sse - kept.sse < MIN_SHARE * (without[effect].sse - final.sse):
                 kept = other
-        if kept is not beside:
+        if kept is not with_all:
             needed = {effect: search.reduced(kept, effect) for effect in without if effect in kept.spec.effects}
             contenders = search.rivals(kept, needed)
             return search, (kept, needed, contenders), _needed(problem, kept, [*hidden, *whole])

@@ -98,7 +98,7 @@ def _begins_at(run: Run) -> tuple[float, float]:
     """Return what a run's coldest spring shows then, degC, and how far the warmest is above it, K."""
     first = run.temperature_c[_before_driven(run)]
     # a mean: where thermometers step, it is finer than any of them; without what is nonsense
-    middle = [statistics.trimmed_mean(one[np.isfinite(one)], 0.1) for one in first.T if np.isfinite(one).any()]
+    middle = [statistics.trimmed_mean(one[np.isfinite(one)]) for one in first.T if np.isfinite(one).any()]
     return (float(min(middle)), float(max(middle) - min(middle))) if middle else (math.nan, math.nan)
 
 
@@ -132,7 +132,7 @@ def _coldest(time_s: np.ndarray, shown_c: np.ndarray) -> tuple[float, float]:
     """Return the lowest mean of any FIRST_S of what a thermometer shows, degC, and when that was, s; without what is nonsense."""
     edges = np.searchsorted(time_s, np.arange(time_s[0], time_s[-1] + FIRST_S, FIRST_S))
     parts = [(begin, end) for begin, end in itertools.pairwise(edges) if end > begin]
-    means = [statistics.trimmed_mean(shown_c[begin:end], 0.1) for begin, end in parts]
+    means = [statistics.trimmed_mean(shown_c[begin:end]) for begin, end in parts]
     least = int(np.argmin(means))
     return float(means[least]), float(np.mean(time_s[slice(*parts[least])]))
 

@@ -203,7 +203,7 @@ def rms_there(values: np.ndarray) -> float | None:
     return rms([values]) if np.isfinite(values).any() else None
 
 
-def spikes(residual: np.ndarray, noise: np.ndarray, limit: float = 6.0) -> np.ndarray:
+def spikes(residual: np.ndarray, noise: np.ndarray) -> np.ndarray:
     """Return a mask (rows, columns) of isolated outliers: far from the median of the eight around them."""
     rows, columns = residual.shape
     out = np.zeros((rows, columns), dtype=bool)
@@ -216,10 +216,10 @@ def spikes(residual: np.ndarray, noise: np.ndarray, limit: float = 6.0) -> np.nd
         middle = np.nanmedian(windows, axis=2)
         spread = 1.4826 * np.nanmedian(np.abs(windows - middle[:, :, None]), axis=2)
     away = np.abs(residual - middle)
-    return np.isfinite(away) & (away > limit * noise) & (away > 4.0 * spread)
+    return np.isfinite(away) & (away > 6.0 * noise) & (away > 4.0 * spread)
 
 
-def trimmed_mean(values: np.ndarray, share: float) -> float:
-    """Return the mean without that share of the values at either end."""
-    cut = int(share * values.size)
+def trimmed_mean(values: np.ndarray) -> float:
+    """Return the mean without a tenth of the values at either end."""
+    cut = int(0.1 * values.size)
     return float(np.partition(values, (cut, values.size - cut - 1))[cut : values.size - cut].mean())

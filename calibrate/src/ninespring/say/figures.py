@@ -52,8 +52,8 @@ def as_svg(figure: Figure) -> Markup:
     return Markup(text[text.index("<svg") :])
 
 
-def _thin(n: int, most: int = 500) -> slice:
-    return slice(None, None, max(1, n // most))
+def _thin(n: int) -> slice:
+    return slice(None, None, max(1, n // 500))
 
 
 def traces(found: Diagnosis) -> list[tuple[Markup, Markup]]:
