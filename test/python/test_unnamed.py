@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from ninespring.find import diagnosis, search, unnamed
 from ninespring.find.evidence import excess
+from ninespring.infer.fit import Fit
+from ninespring.infer.problem import Problem
 from ninespring.infer.scene import scene_of
 from ninespring.io.logs import read_log
 from ninespring.model import effects, native
@@ -19,6 +21,18 @@ from plants import a_plant
 EDGES = {"edge_loss": {"edge_loss_fraction": 0.2}}
 LATENT = {"latent_heat": {"latent_heat_j": 7.0}}
 WAKE = {"fan_wake": {"wake_w_per_k": 1.5e-3}}
+SWING, GUST = "all drives change again and again", "all losses change again and again"
+
+
+def power_of(columns: dict[str, np.ndarray]) -> np.ndarray:
+    """Return the power of each spring, (rows, springs), W."""
+    return np.column_stack([columns[f"i{k + 1}_a"] ** 2 * 0.2 for k in range(9)])
+
+
+def shifted(columns: dict[str, np.ndarray], by_k: np.ndarray) -> None:
+    """Add (rows, springs), K, to the temperatures."""
+    for k in range(9):
+        columns[f"t{k + 1}_c"] = columns[f"t{k + 1}_c"] + by_k[:, k]
 
 
 def astray(columns: dict[str, np.ndarray], extra: np.ndarray, effects: dict[str, dict[str, float]] = EDGES) -> None:
@@ -26,14 +40,33 @@ def astray(columns: dict[str, np.ndarray], extra: np.ndarray, effects: dict[str,
     rows = len(columns["fan"])
     plant = a_plant((3, 3), effects)
     time_s, fan, around = np.arange(float(rows)), columns["fan"], np.full(rows, 20.0)
-    power = np.column_stack([columns[f"i{k + 1}_a"] ** 2 * 0.2 for k in range(9)])
-    shown = []
+    power, shown = power_of(columns), []
     for watts in (power, power + extra):
         twin = plant.copy()
         twin.reset()
         shown.append(twin.simulate(time_s, native.POWER, watts, fan, around))
-    for k in range(9):
-        columns[f"t{k + 1}_c"] = columns[f"t{k + 1}_c"] + shown[1][:, k] - shown[0][:, k]
+    shifted(columns, shown[1] - shown[0])
+
+
+def heated(columns: dict[str, np.ndarray], spring: int, watts: Any, effects: Any = EDGES) -> None:
+    """Give one spring, from 1, so much more, (rows,) or always, W."""
+    extra = np.zeros((len(columns["fan"]), 9))
+    extra[:, spring - 1] = watts
+    astray(columns, extra, effects)
+
+
+def fitted(
+    make_log: Callable[..., Path], names: Sequence[str] = (), **kind: Any
+) -> tuple[Problem, Fit, list[unnamed.Cause]]:
+    """Return a log's problem, the declared model fitted with some effects, and all causes without a name around it."""
+    problem, fit, _ = diagnosis.fit_effects(Array(), [read_log(make_log(seed=3, **kind))], names)
+    return problem, fit, unnamed.library(problem, fit)
+
+
+def taken_whole(kinds: Sequence[unnamed.Cause], text: str) -> list[unnamed.Hidden]:
+    """Return the first cause of these words as one that is there all the time."""
+    one = next(one for one in kinds if one.text == text)
+    return [unnamed.Hidden(one, one.text, (0, None), one.columns)]
 
 
 def diagnosed(make_log: Callable[..., Path], seeds: tuple[int, ...] = (3, 4), **kind: Any) -> dict[str, Any]:
@@ -44,9 +77,7 @@ def diagnosed(make_log: Callable[..., Path], seeds: tuple[int, ...] = (3, 4), **
 
 def crosstalk(columns: dict[str, np.ndarray]) -> None:
     """Let the drive of spring 1 heat spring 9 by a fifth."""
-    extra = np.zeros((len(columns["fan"]), 9))
-    extra[:, 8] = 0.2 * columns["i1_a"] ** 2 * 0.2
-    astray(columns, extra)
+    heated(columns, 9, 0.2 * columns["i1_a"] ** 2 * 0.2)
 
 
 @pytest.mark.nightly
@@ -69,9 +100,8 @@ def test_a_name_goes_before_what_has_none(make_log) -> None:
         for k in range(9):
             columns[f"t{k + 1}_c"] = 1.05 * columns[f"t{k + 1}_c"]
 
-    log = read_log(make_log(seed=3, effects=EDGES, change=change))
-    problem, fit, _ = diagnosis.fit_effects(Array(), [log], ["edge_loss"])
-    kinds, first = unnamed.library(problem, fit), search.Search(problem, effects.candidates(scene_of(problem)), fit)
+    problem, fit, kinds = fitted(make_log, ["edge_loss"], effects=EDGES, change=change)
+    first = search.Search(problem, effects.candidates(scene_of(problem)), fit)
     alone = unnamed.find(problem, fit, kinds, ())
     before_it = unnamed.find(problem, fit, [*kinds, *unnamed._named(problem, first, fit)], ())
     assert [one.cause.kind for one in before_it] == ["crosstalk"] and len(alone) > 1
@@ -110,7 +140,7 @@ def test_a_cause_that_stood_for_names_is_taken_as_it_is_by_the_numbers_that_it_h
 
 def swinging(columns: dict[str, np.ndarray], period_s: float) -> np.ndarray:
     """Return heat by which every spring is heated more and less, by a third, (rows, springs), W."""
-    power = np.column_stack([columns[f"i{k + 1}_a"] ** 2 * 0.2 for k in range(9)])
+    power = power_of(columns)
     return power * np.sin(np.arange(float(len(power))) / period_s * 2.0 * np.pi)[:, None] / 3.0
 
 
@@ -120,11 +150,9 @@ def swinging_drives(columns: dict[str, np.ndarray]) -> None:
 
 
 def test_what_comes_and_goes_within_a_minute_leaves_nothing_that_matters(make_log) -> None:
-    log = read_log(make_log(seed=3, effects=EDGES, change=lambda columns: astray(columns, swinging(columns, 80.0))))
-    problem, fit, _ = diagnosis.fit_effects(Array(), [log], ["edge_loss"])
-    kinds = unnamed.library(problem, fit)
-    swing = next(one for one in kinds if one.text == "all drives change again and again")
-    unnamed.taken_out(problem, fit, [unnamed.Hidden(swing, swing.text, (0, None), swing.columns)])
+    change = lambda columns: astray(columns, swinging(columns, 80.0))  # noqa: E731
+    problem, fit, kinds = fitted(make_log, ["edge_loss"], effects=EDGES, change=change)
+    unnamed.taken_out(problem, fit, taken_whole(kinds, SWING))
     beside = problem.fit(fit.spec, fit.as_dict())
     assert excess(problem, beside) < 0.5**2 < 3.0**2 < excess(problem, fit)
 
@@ -133,12 +161,10 @@ def test_only_one_cause_comes_and_goes_as_it_likes(make_log) -> None:
     def warmed(columns: dict[str, np.ndarray]) -> None:
         astray(columns, np.zeros((600, 9)) + 0.15 * np.sin(np.arange(600.0) / 11.0)[:, None])
 
-    problem, fit, _ = diagnosis.fit_effects(Array(), [read_log(make_log(seed=3, change=warmed))], [])
-    kinds = unnamed.library(problem, fit)
+    problem, fit, kinds = fitted(make_log, change=warmed)
     (first, *_) = unnamed.find(problem, fit, kinds, ())
     assert first.cause.bumps
-    other = next(one for one in kinds if one.bumps and one.kind == "gust")
-    hidden = unnamed.taken_out(problem, fit, [unnamed.Hidden(other, other.text, (0, None), other.columns)])
+    hidden = unnamed.taken_out(problem, fit, taken_whole(kinds, GUST))
     found = unnamed.find(problem, problem.evaluate(fit), kinds, hidden)
     assert len(found) > 1 and sum(bool(one.cause.bumps) for one in found) == 1
 
@@ -148,9 +174,7 @@ MISMATCH = {"spring_mismatch": {"loss_scale[6]": 1.18}}
 
 def swinging_losses(columns: dict[str, np.ndarray]) -> None:
     """Let every loss swing by a third within eleven minutes, about that of an array with one other spring."""
-    rows = len(columns["fan"])
-    power = np.column_stack([columns[f"i{k + 1}_a"] ** 2 * 0.2 for k in range(9)])
-    shown = []
+    rows, power, shown = len(columns["fan"]), power_of(columns), []
     for size in (0.0, 0.33):
         plant = a_plant((3, 3), MISMATCH, {"ambient_c": 20.0})
         still, blown = plant.get("loss_w_per_k"), plant.get("loss_fan_w_per_k")
@@ -162,15 +186,12 @@ def swinging_losses(columns: dict[str, np.ndarray]) -> None:
             time_s = np.arange(2.0)[: len(power[here])]
             out[row] = plant.simulate(time_s, native.POWER, power[here], columns["fan"][here])[0]
         shown.append(out)
-    for k in range(9):
-        columns[f"t{k + 1}_c"] = columns[f"t{k + 1}_c"] + shown[1][:, k] - shown[0][:, k]
+    shifted(columns, shown[1] - shown[0])
 
 
 def test_what_comes_and_goes_slowly_needs_few_numbers(make_log) -> None:
     """Beside another spring that nothing has named yet, which leaves few samples that are independent."""
-    log = read_log(make_log(seed=3, effects=MISMATCH, change=swinging_losses, seconds=900))
-    problem, fit, _ = diagnosis.fit_effects(Array(), [log], [])
-    found = unnamed.find(problem, fit, unnamed.library(problem, fit), ())
+    found = unnamed.find(*fitted(make_log, effects=MISMATCH, change=swinging_losses, seconds=900), ())
     (swing,) = (one for one in found if one.cause.bumps)
     assert len(swing.cause.bumps) < 20
 
@@ -191,8 +212,7 @@ def test_small_causes_at_a_spring_are_no_reason_to_doubt_its_name(make_log) -> N
 
 
 def test_what_comes_and_goes_is_straight_between_edges_as_far_apart_as_it_says(make_log) -> None:
-    problem, fit, _ = diagnosis.fit_effects(Array(), [read_log(make_log(seed=3))], [])
-    gusts = [one for one in unnamed.library(problem, fit) if one.text == "all losses change again and again"]
+    gusts = [one for one in fitted(make_log)[2] if one.text == GUST]
     assert [len(one.bumps) for one in gusts] == [41, 21, 11, 6]
     for one in gusts:
         # all together they are there all the time, however wide each is
@@ -209,47 +229,36 @@ def test_losses_that_come_and_go_explain_nothing_by_being_there_all_the_time(mak
     problem, fit, _ = diagnosis.fit_effects(Array(), runs, [])
     kinds = unnamed.library(problem, fit)
     assert not unnamed.find(problem, fit, kinds, (), most=1)
-    gust = next(one for one in kinds if one.text == "all losses change again and again")
-    column = unnamed.Hidden(gust, gust.text, (0, None), gust.columns).around(problem, fit).column
+    (gust,) = taken_whole(kinds, GUST)
+    column = gust.around(problem, fit).column
     left = np.concatenate(problem.scaled(fit.residual))
     size, _ = unnamed._least_squares(column.T @ column, column.T @ left)
     assert float(size @ (column.T @ left)) < 0.3 * float(left @ left)
 
 
 def test_a_name_goes_before_what_comes_and_goes_at_its_spring(make_log) -> None:
-    def blown(columns: dict[str, np.ndarray]) -> None:
-        extra = np.zeros((len(columns["fan"]), 9))
-        extra[:, 5] = 0.1 * np.sin(np.arange(float(len(extra))) / 9.0)
-        astray(columns, extra, {})
-
-    log = read_log(make_log(seed=3, change=blown))
+    blown = lambda columns: heated(columns, 6, 0.1 * np.sin(np.arange(600.0) / 9.0), {})  # noqa: E731
     at_spring = []
     for names in ([], ["spring_mismatch"]):
-        problem, fit, _ = diagnosis.fit_effects(Array(), [log], names)
-        found = unnamed.find(problem, fit, unnamed.library(problem, fit), ())
+        found = unnamed.find(*fitted(make_log, names, change=blown), ())
         at_spring.append([one.text for one in found if one.cause.bumps])
     assert at_spring == [["spring 6 is given heat again and again"], []]
 
 
 def test_no_drift_of_a_logged_ambient_is_a_name_beside_what_comes_and_goes(make_log) -> None:
-    log = read_log(make_log(seed=3, change=lambda columns: astray(columns, swinging(columns, 80.0), {})))
-    problem, fit, _ = diagnosis.fit_effects(Array(), [log], [])
+    change = lambda columns: astray(columns, swinging(columns, 80.0), {})  # noqa: E731
+    problem, fit, kinds = fitted(make_log, change=change)
     first = search.Search(problem, effects.candidates(scene_of(problem)), fit)
-    swing = next(one for one in unnamed.library(problem, fit) if one.text == "all drives change again and again")
-    hidden = [unnamed.Hidden(swing, swing.text, (0, None), swing.columns)]
     drifts = [
         {one.variant for one in unnamed._beside(problem, first, beside).candidates if one.effect == "ambient_drift"}
-        for beside in ([], hidden)
+        for beside in ([], taken_whole(kinds, SWING))
     ]
     assert drifts == [{"ramp", "free"}, {"ramp"}]
 
 
 def test_a_name_has_its_size_beside_heat_that_moves_the_transformation(make_log) -> None:
-    log = read_log(make_log("3.csv", seed=3, effects=LATENT, change=swinging_drives))
-    problem, alone, _ = diagnosis.fit_effects(Array(), [log], ["latent_heat"])
-    kinds = unnamed.library(problem, alone)
-    swing = next(one for one in kinds if one.text == "all drives change again and again")
-    hidden = unnamed.taken_out(problem, alone, [unnamed.Hidden(swing, swing.text, (0, None), swing.columns)])
+    problem, alone, kinds = fitted(make_log, ["latent_heat"], effects=LATENT, change=swinging_drives)
+    hidden = unnamed.taken_out(problem, alone, taken_whole(kinds, SWING))
     straight = problem.fit(alone.spec, alone.as_dict())
     fit, _ = unnamed.simulated(problem, straight, hidden)
     assert fit.sse < 1.5 * fit.count < straight.sse
@@ -264,13 +273,7 @@ def test_nothing_without_a_name_where_the_library_explains_all(make_log) -> None
 @pytest.mark.nightly
 def test_a_trickle_of_heat_is_no_thermometer_with_an_offset(make_log) -> None:
     """What the library would take for a false thermometer is told as what it is, where that explains more."""
-
-    def trickle(columns: dict[str, np.ndarray]) -> None:
-        extra = np.zeros((len(columns["fan"]), 9))
-        extra[:, 3] = 0.06
-        astray(columns, extra)
-
-    found = diagnosed(make_log, seeds=(3,), effects=EDGES, change=trickle)
+    found = diagnosed(make_log, seeds=(3,), effects=EDGES, change=lambda columns: heated(columns, 4, 0.06))
     assert [one["name"] for one in found["effects"]] == ["edge_loss"] and found["unexplained"]
     (cause,) = found["unnamed"]
     assert "spring 4 is given heat, 0 to 599 s of run 1" in cause["text"]
@@ -280,13 +283,7 @@ def test_a_trickle_of_heat_is_no_thermometer_with_an_offset(make_log) -> None:
 @pytest.mark.nightly
 def test_names_that_stand_in_for_a_trickle_of_heat_go_and_the_true_one_stays(make_log) -> None:
     """A thermometer's gain and a spring's own loss would explain it together, beside the latent heat that is there."""
-
-    def trickle(columns: dict[str, np.ndarray]) -> None:
-        extra = np.zeros((len(columns["fan"]), 9))
-        extra[:, 6] = 0.06
-        astray(columns, extra, LATENT)
-
-    found = diagnosed(make_log, effects=LATENT, change=trickle)
+    found = diagnosed(make_log, effects=LATENT, change=lambda columns: heated(columns, 7, 0.06, LATENT))
     assert [one["name"] for one in found["effects"]] == ["latent_heat"] and found["unexplained"]
     assert any("spring 7 is given heat all the time" in one["text"] for one in found["unnamed"])
 
