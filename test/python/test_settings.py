@@ -50,11 +50,6 @@ def test_an_upload_is_taken_back_and_the_one_before_it_next(fake: FakeBoard, tmp
     assert (code, "no upload to this board is kept" in said) == (1, True)
 
 
-def test_an_upload_sends_settings_reads_them_back_and_saves(fake: FakeBoard, tmp_path: Path) -> None:
-    upload(fake, tmp_path, "# from model.toml", "$loss_scale_1=1.100", "$loss_w_per_k=0.006000")
-    assert fake.sent()[-5:] == ["learnt clear", "$loss_scale_1=1.100", "$loss_w_per_k=0.006000", "$$", "$save"]
-
-
 def believed(*warm_c: float) -> list[str]:
     """A board's answer to `model`: springs 1 ... as warm as that, and one of which nothing is known yet."""
     each = [*map(str, warm_c), "68.6"]
@@ -103,20 +98,19 @@ def test_what_the_board_does_not_take_is_said_and_nothing_saved(
     assert "$save" not in board.seen
 
 
-def test_a_refused_upload_gives_back_what_it_sent_before(fake: FakeBoard, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("takes_back", "said"), [(True, "the board has what it had"), (False, "a reset of the board gives back")]
+)
+def test_a_refused_upload_gives_back_what_it_sent_before(
+    fake: FakeBoard, tmp_path: Path, takes_back: bool, said: str
+) -> None:
     fake.answers["$hold_margin_k=300"] = ["error:4 out of range"]
+    if not takes_back:
+        fake.answers[f"$loss_w_per_k={HAD['loss_w_per_k']}"] = ["error:12 a spring is on"]
     (tmp_path / "s.txt").write_text("$loss_w_per_k=0.009100\n$hold_margin_k=300\n")
-    code, said = ninespring("upload", "--port", fake.port, tmp_path / "s.txt")
-    assert (code, "error 4 out of range: nothing is saved, the board has what it had" in said) == (1, True), said
-    assert fake.settings == HAD and "$save" not in fake.sent()
-
-
-def test_a_board_that_does_not_take_it_back_needs_a_reset(fake: FakeBoard, tmp_path: Path) -> None:
-    fake.answers["$hold_margin_k=300"] = ["error:4 out of range"]
-    fake.answers[f"$loss_w_per_k={HAD['loss_w_per_k']}"] = ["error:12 a spring is on"]
-    (tmp_path / "s.txt").write_text("$loss_w_per_k=0.009100\n$hold_margin_k=300\n")
-    code, said = ninespring("upload", "--port", fake.port, tmp_path / "s.txt")
-    assert (code, "out of range: nothing is saved, a reset of the board gives back" in said) == (1, True), said
+    code, told = ninespring("upload", "--port", fake.port, tmp_path / "s.txt")
+    assert (code, f"error 4 out of range: nothing is saved, {said}" in told) == (1, True), told
+    assert (fake.settings == HAD) is takes_back and "$save" not in fake.sent()
 
 
 def test_what_the_board_has_otherwise_than_sent_is_not_taken_back(fake: FakeBoard, tmp_path: Path) -> None:
