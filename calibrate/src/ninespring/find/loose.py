@@ -112,18 +112,14 @@ def _nats(problem: Problem, fit: Fit, column: np.ndarray | None) -> float:
     return out
 
 
-def _slopes(problem: Problem, fit: Fit) -> Fit:
-    """Return a fit with slopes, and what it leaves as nothing is taken out."""
-    fit = problem.evaluate(fit)
-    return replace(fit, jacobian=problem.jacobian(fit.spec, fit.values, problem.predictions(fit.spec, fit.values)))
-
-
 def _window(problem: Problem, final: Fit) -> tuple[Hidden, Fit, np.ndarray | None] | None:
     """Return the window of one thermometer that explains most, the fit beside it, and what the best of all other causes adds to the
     readings, (count, 1); None where heat would explain as much, or it is too little to be told."""
     fit, found, rival = final, None, None
     for turn in range(AROUND):
-        bare = _slopes(problem, fit) if turn or fit.jacobian is None else fit
+        bare = fit
+        if turn or fit.jacobian is None:  # what it leaves as nothing is taken out
+            bare = problem.with_slopes(replace(problem.evaluate(fit), jacobian=None))
         basis, left = laid_bare(problem, bare)
         beyond = max(1e-12, float(left @ left) - len(left))
         # not all of a run, which may be another run's offset, nor a part more of the rise: how much, only numbers that it has not spoilt tell

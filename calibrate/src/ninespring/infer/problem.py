@@ -574,7 +574,9 @@ class Problem:
         fold = self.of_samples([fold_of_rows(run)[:, None] for run in self.runs])
         noise = self.of_samples(self.noise)
         both = np.column_stack([slopes, left])
-        weighed = both if self.colour is None else self._weighed(fit)
+        weighed = both
+        if self.colour is not None:  # as what lasts has them weighed
+            weighed = np.column_stack([self.with_slopes(fit).jacobian, self.vector(fit.residual)])
         believed = np.column_stack([np.diag(trust), believed])
 
         def numbers(out: np.ndarray | None = None) -> np.ndarray:
@@ -598,13 +600,6 @@ class Problem:
         fit.holdout = math.sqrt(total / max(1, self.count))
         return fit.holdout
 
-    def _weighed(self, fit: Fit) -> np.ndarray:
-        """Return a fit's slopes and what it leaves, as what lasts has them weighed, (count, free + 1)."""
-        slopes = fit.jacobian
-        if slopes is None:
-            slopes = self.jacobian(fit.spec, fit.values, self.predictions(fit.spec, fit.values))
-        return np.column_stack([slopes, self.vector(fit.residual)])
-
     def slopes(self, fit: Fit, columns: Sequence[int] | None = None) -> np.ndarray:
         """Return d(residual vector)/d(inner coordinate) at a fit's numbers."""
         return self.jacobian(fit.spec, fit.values, self.predictions(fit.spec, fit.values), columns)
@@ -626,8 +621,8 @@ class Problem:
         A sandwich: J'J inverse around the long-run covariance of J'r over blocks in time (all springs of a block
         together), never less than what white noise alone would give.
         """
-        jac, fit.weighed = self.slopes(fit), self.weighed
-        fit.jacobian = jac
+        jac = fit.jacobian = self.slopes(fit)
+        fit.weighed = self.weighed
         used = [k for k, f in enumerate(fit.spec.free) if f.key not in fit.stuck]
         covariance = np.full((jac.shape[1], jac.shape[1]), 0.0)
         fit.factor = self.alike([left / noise for left, noise in zip(fit.residual, self.noise, strict=True)])
