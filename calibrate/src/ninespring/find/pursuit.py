@@ -27,18 +27,6 @@ def steps_up(edges: Sequence[int] | np.ndarray, rows: int, springs: int, at: int
     return out
 
 
-def products(columns: np.ndarray, basis: np.ndarray) -> np.ndarray:
-    """Return the products of columns with one another, a basis projected out."""
-    inside = basis.T @ columns
-    return (columns.T @ columns - inside.T @ inside).astype(float)
-
-
-def take(units: np.ndarray, one: Cause, gram: np.ndarray) -> None:
-    """Take more, an orthonormal basis (samples, n) beside what is out by now, out of the products of a cause's columns."""
-    inside = units.T @ one.columns
-    gram -= inside.T @ inside
-
-
 def _powers(gram: np.ndarray) -> np.ndarray:
     """Return the squares of every window, (edges, edges + 1), from the products of steps up; the last edge is the end."""
     square = np.append(np.diag(gram), 0.0)
@@ -79,20 +67,30 @@ class Pursuit:
         there by less than `least_left` beside what is taken out explains nothing."""
         self.single = [one for one in causes if not one.edges]
         self.windows = [one for one in causes if one.edges]
+        self.basis = basis
         self._shortest, self._signs, self._least_left = shortest, signs or {}, least_left
         empty = np.zeros((len(basis), 0), dtype=np.float32)
         self._matrix = np.column_stack([empty, *(one.columns[:, 0] for one in self.single)])
         self._sign = np.array([self._signs.get(one.kind, 0) for one in self.single])
         self._whole = (self._matrix**2).sum(axis=0)
         self._power = self._whole - ((basis.T @ self._matrix) ** 2).sum(axis=0)
-        self._grams = [products(one.columns, basis) for one in self.windows]
+        self._grams: dict[int, tuple[Cause, np.ndarray]] = {}
         self._of_all = [_powers((one.columns.T @ one.columns).astype(float)) for one in self.windows]
 
     def take(self, units: np.ndarray) -> None:
         """Take more out: an orthonormal basis (samples, n) beside what is taken out by now."""
+        self.basis = np.column_stack([self.basis, units])
         self._power = self._power - ((units.T @ self._matrix) ** 2).sum(axis=0)
-        for one, gram in zip(self.windows, self._grams, strict=True):
-            take(units, one, gram)
+        for one, gram in self._grams.values():
+            inside = units.T @ one.columns
+            gram -= inside.T @ inside
+
+    def gram(self, one: Cause) -> np.ndarray:
+        """Return the products of a cause's columns with one another, what is taken out projected out."""
+        if id(one) not in self._grams:
+            inside = self.basis.T @ one.columns
+            self._grams[id(one)] = one, (one.columns.T @ one.columns - inside.T @ inside).astype(float)
+        return self._grams[id(one)][1]
 
     def gains(self, left: np.ndarray) -> np.ndarray:
         """Return what each of those that act all the time explains of what is left (samples,)."""
@@ -107,20 +105,18 @@ class Pursuit:
         if gains.size:
             k = int(np.argmax(gains))
             out = Choice(float(gains[k]), self.single[k], self._matrix[:, k])
-        for one, gram, of_all in zip(self.windows, self._grams, self._of_all, strict=True):
+        for one, of_all in zip(self.windows, self._of_all, strict=True):
             if but(one):
                 continue
-            drop, a, b = self._window(one, gram, of_all, left, rests)
+            drop, a, b = self._window(one, of_all, left, rests)
             if drop > (out.drop if out else 0.0):
-                vector = one.columns[:, a] - (0.0 if b == len(gram) else one.columns[:, b])
+                vector = one.columns[:, a] - (0.0 if b == len(of_all) else one.columns[:, b])
                 out = Choice(drop, one, vector, (a, b))
         return out
 
-    def _window(
-        self, one: Cause, gram: np.ndarray, of_all: np.ndarray, left: np.ndarray, rests: int
-    ) -> tuple[float, int, int]:
+    def _window(self, one: Cause, of_all: np.ndarray, left: np.ndarray, rests: int) -> tuple[float, int, int]:
         """Return what the best window of a cause explains, and its edges, the last of which is the end of the run."""
-        moment, power, count = one.columns.T @ left, _powers(gram), len(gram)
+        moment, power, count = one.columns.T @ left, _powers(self.gram(one)), len(of_all)
         moments = moment[:, None] - np.append(moment, 0.0)[None, :]
         edges = np.arange(count + 1)[None, :] - np.arange(count)[:, None]
         possible = (edges >= self._shortest) & (edges <= count - rests) & (power > 1e-6)

@@ -25,7 +25,7 @@ from ..model.spec import RUNS_OWN
 from . import evidence
 from .causes import SHORTEST, Cause, bump, column_of, library, thinned, typical_power
 from .evidence import fit_factor, price, unexplained
-from .pursuit import Pursuit, products, take
+from .pursuit import Pursuit
 from .search import MIN_GAIN, MIN_SHARE, Search
 
 KINDS = 500
@@ -171,7 +171,6 @@ def find(
     often = [one for one in often if one.place not in springs]
     among = Pursuit([one for one in kinds if not one.bumps], basis, SHORTEST, dict.fromkeys(GIVES_ONLY, 1))
     named = np.array([one.kind == NAMED for one in among.single], dtype=bool)
-    often_grams: list[np.ndarray] = []
     tried = len(among.single) + sum(one.columns.shape[1] ** 2 / 2 for one in among.windows)
     while len(found) < most:
         choice = among.best(left, lambda one: one.kind == NAMED or _within(one, found))
@@ -183,14 +182,12 @@ def find(
         independent = samples
         # the half that one window leaves may be many more like it, and one where another was found says that there are more
         many = drop < 0.5 * (rest - len(left)) or any(one.cause.text == best.text and best.edges for one in found)
-        if many and not often_grams:
-            often_grams = [products(one.columns, basis) for one in often]
-        for one, gram in zip(often, often_grams, strict=True) if many else ():
+        for one in often if many else ():
             moment = one.columns.T @ left
-            size, numbers = _least_squares(gram, moment)
+            size, numbers = _least_squares(among.gram(one), moment)
             explained = float(size @ moment)
             answer = one.columns @ size
-            own = _independent(problem, left - answer + basis @ (basis.T @ answer))
+            own = _independent(problem, left - answer + among.basis @ (among.basis.T @ answer))
             # as between two fits, what is left by the one that explains more tells how many samples are independent
             if _nats(own if explained > drop else independent, rest - drop, rest - explained, numbers - spent) > 0.0:
                 nats, independent = _nats(own, rest, rest - explained, numbers) - math.log(tried), own
@@ -206,14 +203,11 @@ def find(
             break  # what is left of one of its size is no second of it
         found.append(Hidden(best, text, span, column_of(problem, fit, best, typical, *span)))
         if best.bumps:
-            often, often_grams = [], []
-        vectors = vectors - basis @ (basis.T @ vectors)
+            often = []
+        vectors = vectors - among.basis @ (among.basis.T @ vectors)
         units = np.linalg.qr(vectors[:, np.linalg.norm(vectors, axis=0) > 1e-3])[0]
         left = left - units @ (units.T @ left)
-        basis = np.column_stack([basis, units])
         among.take(units)
-        for one, gram in zip(often, often_grams, strict=False):
-            take(units, one, gram)
     return found
 
 
