@@ -96,7 +96,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "diagnose",
         "Undeclared effects",
-        f"{PYTHON} bench/diagnose/run.py --seeds 1 --first 300790 --processes 1 --cases build/results/diagnose.json",
+        f"{PYTHON} bench/diagnose/run.py --seeds 1 --first 300820 --processes 1 --cases build/results/diagnose.json",
         markdown=True,
     ),
     Section(
