@@ -227,7 +227,8 @@ class Unseen:
         self.lagged = self.base
         if self.lag is not None and LAG not in self.base.spec.effects:
             spec = self.lag.added_to(self.base.spec)
-            start = self.base.as_dict() | self.lag.start_at(1.0)
+            found = self.found.fits.get(self.found.key(spec))  # from several starts: of two minima the better one
+            start = found.as_dict() if found else self.base.as_dict() | self.lag.start_at(1.0)
             colour = self.problem.colour
             self.problem.take_for(None)
             self.lagged = self.problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS)
