@@ -96,14 +96,19 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "diagnose",
         "Undeclared effects",
-        f"{PYTHON} bench/diagnose/run.py --seeds 1 --first 300820 --processes 1 --cases build/results/diagnose.json",
+        f"{PYTHON} bench/diagnose/run.py --seeds 1 --first 300790 --processes 1 --cases build/results/diagnose.json",
         markdown=True,
     ),
     Section(
         "hours",
         "Hours of log",
-        f"{PYTHON} bench/diagnose/hours.py --cases 10 --first 341400 --processes 1 --resume build/results/hours.json "
-        "--parts unseen,wander,halves,half_a_day",
+        f"{PYTHON} bench/diagnose/hours.py --cases 10 --first 341100 --processes 1 --resume build/results/hours.json "
+        "--parts unseen,wander,half_a_day",
+    ),
+    Section(
+        "halves",
+        "The second half of a run by its first",
+        f"{PYTHON} bench/diagnose/hours.py --parts halves --processes 1",
     ),
     Section(
         "finned",
@@ -127,7 +132,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "real_logs",
         "What real logs bring",
-        f"{PYTHON} bench/diagnose/real_logs.py --first 311500 --resume build/results/real_logs.json",
+        f"{PYTHON} bench/diagnose/real_logs.py --first 311400 --resume build/results/real_logs.json",
     ),
     Section("actuator", "A real actuator, each run alone", f"{PYTHON} bench/diagnose/actuator.py"),
     Section("size", "How much there is to read", f"{PYTHON} bench/size.py"),
