@@ -96,13 +96,13 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "diagnose",
         "Undeclared effects",
-        f"{PYTHON} bench/diagnose/run.py --seeds 1 --first 300790 --processes 1 --cases build/results/diagnose.json",
+        f"{PYTHON} bench/diagnose/run.py --seeds 1 --first 300830 --processes 1 --cases build/results/diagnose.json",
         markdown=True,
     ),
     Section(
         "hours",
         "Hours of log",
-        f"{PYTHON} bench/diagnose/hours.py --cases 10 --first 341100 --processes 1 --resume build/results/hours.json "
+        f"{PYTHON} bench/diagnose/hours.py --cases 10 --first 341403 --processes 1 --resume build/results/hours.json "
         "--parts unseen,wander,half_a_day",
     ),
     Section(
@@ -113,12 +113,12 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "finned",
         "Finned boards in a box",
-        f"{PYTHON} bench/diagnose/hours.py --cases 6 --first 341200 --processes 1 --resume build/results/finned.json --parts finned",
+        f"{PYTHON} bench/diagnose/hours.py --cases 6 --first 341220 --processes 1 --resume build/results/finned.json --parts finned",
     ),
     Section(
         "camera",
         "A camera's blur",
-        f"{PYTHON} bench/diagnose/camera.py --sets 15 --first 700200 --processes 1 --cases build/results/camera.json",
+        f"{PYTHON} bench/diagnose/camera.py --sets 15 --first 700300 --processes 1 --cases build/results/camera.json",
         markdown=True,
     ),
     Section("closed_forms", "The field against closed forms", f"{PYTHON} bench/explore/closed_forms.py"),
@@ -132,7 +132,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "real_logs",
         "What real logs bring",
-        f"{PYTHON} bench/diagnose/real_logs.py --first 311400 --resume build/results/real_logs.json",
+        f"{PYTHON} bench/diagnose/real_logs.py --first 311500 --resume build/results/real_logs.json",
     ),
     Section("actuator", "A real actuator, each run alone", f"{PYTHON} bench/diagnose/actuator.py"),
     Section("size", "How much there is to read", f"{PYTHON} bench/size.py"),
