@@ -38,7 +38,8 @@ constexpr double STOPPED_S = 0.003; /* '!': a byte, and 1 ms */
 constexpr double HEALED_S = 0.05; /* a register is written again in each tick; and a stop's byte */
 constexpr double DONE_S = 0.05;   /* what a line has changed is done in the tick after its answer */
 constexpr double ANSWER_S = 12.0; /* the longest: selftest, nine springs of 0.6 s; $save 3.4 s */
-constexpr double QUIET_S = 0.5;   /* after garbage */
+constexpr double SELFTEST_S = 6.0; /* nine springs of 0.6 s, and answers that are held up */
+constexpr double QUIET_S = 0.5;    /* after garbage */
 /* Then it is asked this, and every answer before this one's is to what was garbage: telemetry may
  * hold answers up for longer than any time that one would wait. */
 constexpr const char *SYNC = "$rows";
@@ -246,6 +247,7 @@ private:
         if (asked[0] == '$' && ok && answer_.size() == 1 && starts(answer_[0], "$") &&
             answer_[0].find('=') != std::string::npos) {
             const std::size_t at = answer_[0].find('=');
+            unsure_.erase(answer_[0].substr(1, at - 1));
             settings_[answer_[0].substr(1, at - 1)] = answer_[0].substr(at + 1);
             return;
         }
@@ -259,6 +261,7 @@ private:
             for (unsigned k = 0; k < SPRINGS; ++k) {
                 wish_[k] = asked[8 + k] == '1';
             }
+            may_.fill(false);
         } else if (starts(asked, "on ")) {
             const bool zero = asked.size() > 5 && asked.substr(asked.rfind(' ')) == " 0";
             set_wish(asked.substr(3, asked.find(' ', 3) - 3), !zero);
@@ -266,7 +269,7 @@ private:
             set_wish(asked.substr(4), false);
         } else if (asked == "clear" || asked == "unlock" || asked == "supply off" ||
                    (asked == "supply on" && !was_fed_) || starts(asked, "selftest")) {
-            wish_.fill(false);
+            wish_nothing();
             stopped_ = stopped_ && asked != "clear";
         }
         forgotten_s_ = now_s();
@@ -274,10 +277,39 @@ private:
 
     void set_wish(const std::string &which, bool on)
     {
-        if (which == "all") {
-            wish_.fill(on);
-        } else {
-            wish_[static_cast<unsigned>(std::atoi(which.c_str()) - 1) % SPRINGS] = on;
+        for (unsigned k = 0; k < SPRINGS; ++k) {
+            if (is_meant(which, k)) {
+                wish_[k] = on;
+                may_[k] = false;
+            }
+        }
+    }
+
+    static bool is_meant(const std::string &which, unsigned k)
+    {
+        return which == "all" || std::atoi(which.c_str()) == static_cast<int>(k) + 1;
+    }
+
+    void wish_nothing()
+    {
+        wish_.fill(false);
+        may_.fill(false);
+    }
+
+    /* Bytes come upon a line that has no answer yet: it is carried out, or not, and no answer
+     * tells. */
+    void overtaken(const std::string &asked)
+    {
+        const std::size_t equals = asked.find('=');
+        if (asked == "selftest") {
+            tested_s_ = now_s() + SELFTEST_S;
+        } else if (starts(asked, "on ") || starts(asked, "pattern ")) {
+            const bool one = starts(asked, "on ");
+            for (unsigned k = 0; k < SPRINGS; ++k) {
+                may_[k] = may_[k] || !one || is_meant(asked.substr(3, asked.find(' ', 3) - 3), k);
+            }
+        } else if (asked[0] == '$' && equals != std::string::npos) {
+            waiting_.push_front(asked.substr(0, equals)); /* which it is */
         }
     }
 
@@ -379,7 +411,7 @@ private:
         audit_ = true;
         typed_since_.clear();
         unsure_.clear();
-        wish_.fill(false);
+        wish_nothing();
         stopped_ = false;
         hanging_ = false;
         reset_is_due_ = flipped_;
@@ -400,11 +432,13 @@ private:
     void quiet()
     {
         quiet_until_s_ = now_s() + QUIET_S + (saving_ ? 4.0 : 0.0);
-        pending_.reset();
+        if (pending_) {
+            overtaken(lower(*pending_));
+            pending_.reset();
+        }
         waiting_.push_front(SYNC);
         waiting_.push_front("");
         synced_ = false;
-        unsure_.clear();
     }
 
     void happen(const event &e)
@@ -534,10 +568,10 @@ private:
             stop_s_ = 1e9; /* somewhere in it */
         }
         send(bytes);
-        if (bytes.find('!') != std::string::npos) {
-            wish_.fill(false);
-        }
         quiet();
+        if (bytes.find('!') != std::string::npos) {
+            wish_nothing();
+        }
     }
 
     /* ---- what must always hold ---- */
@@ -620,7 +654,7 @@ private:
             char text[120];
             const board_view_spring_t &spring = seen.spring[k];
             if (!wish_[k] && board_duty(board_.raw(), k) > 0.0) {
-                if (now_s() - forgotten_s_ > 0.1) {
+                if (!may_[k] && now_s() - forgotten_s_ > 0.1) {
                     std::snprintf(text, sizeof text, "spring %u is driven, and nobody asked",
                                   k + 1);
                     breaks("on", text);
@@ -684,7 +718,7 @@ private:
     bool synced_ = true; /* what comes answers what was asked */
     double asked_s_ = 0.0, quiet_until_s_ = 0.0, next_status_s_ = 1.0, tested_s_ = -10.0;
     bool greeted_ = false, was_fed_ = false;
-    std::array<bool, SPRINGS> wish_{};
+    std::array<bool, SPRINGS> wish_{}, may_{}; /* asked for; perhaps: the answer was overtaken */
     /* settings */
     values defaults_, settings_;
     std::vector<values> saved_;

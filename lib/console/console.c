@@ -240,10 +240,11 @@ void console_stop(console_t *console)
 #define BACKSPACE 0x08u
 #define DELETE    0x7Fu
 
-/* What is typed is worth less than the answer that needs the room. */
+/* What is typed is worth less than the answer that needs the room; but where some of it is shown,
+ * the answer begins a line of its own: for the end of the line there is room (console_ready()). */
 static void echo(const console_t *console, const char *bytes, uint8_t length)
 {
-    if (console->echo && room_for(console, CONSOLE_ANSWER_BYTES + length)) {
+    if (console->echo && (bytes[0] == '\r' || room_for(console, CONSOLE_ANSWER_BYTES + length))) {
         console->output.write(console->output.context, bytes, length);
     }
 }

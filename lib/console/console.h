@@ -24,8 +24,9 @@ extern "C" {
 
 #define CONSOLE_LINE_BYTES 64u  /* longest line in, without its end */
 #define CONSOLE_ROOM_BYTES 128u /* longest line out, with its end */
-/* Room that a line in waits for: a refused setting says two lines. */
-#define CONSOLE_ANSWER_BYTES (2u * CONSOLE_ROOM_BYTES)
+/* Room that a line in waits for: its own end where it is echoed, and a refused setting says two
+ * lines. */
+#define CONSOLE_ANSWER_BYTES (2u + 2u * CONSOLE_ROOM_BYTES)
 
 /* What the console shows but does not find in the controller; kept by whoever runs the loop. */
 typedef struct {

@@ -404,8 +404,15 @@ TEST(echo_shows_what_is_typed_and_one_answer_comes_as_ever)
     said_length = 0;
     type("\n\r\n"); /* that the host lives is no line */
     TEST_ASSERT_EQUAL_UINT(0, said_length);
-    room = 2u * CONSOLE_ROOM_BYTES; /* the answer's */
-    TEST_ASSERT_EQUAL_STRING("ok\r\n", ask("fan 7"));
+    room = CONSOLE_ANSWER_BYTES; /* the answer's: it begins a line of its own, whatever was shown
+                                    before */
+    TEST_ASSERT_EQUAL_STRING("\r\nok\r\n", ask("fan 7"));
+    room = 60000;
+    forget();
+    type("fa");
+    room = CONSOLE_ANSWER_BYTES;
+    type("n 7\n");
+    TEST_ASSERT_EQUAL_STRING("fa\r\nok\r\n", said);
     room = 60000;
     ask("echo off");
     TEST_ASSERT_EQUAL_STRING("ok\r\n", ask("fan 7"));
