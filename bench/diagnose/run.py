@@ -25,14 +25,13 @@ from kept import Kept
 from ninespring.find import diagnosis, search
 from ninespring.find.evidence import excess
 from ninespring.infer import problem as fitting
+from ninespring.infer.predict import predict
 from ninespring.infer.result import model_of
 from ninespring.infer.scene import scene_of
 from ninespring.io.logs import read_log
 from ninespring.io.logs.run import Run
-from ninespring.model import native
 from ninespring.model.effects import candidates
 from ninespring.model.models import Array, Model
-from ninespring.model.simulate import simulate_run
 from world import EFFECTS, OUTSIDE
 
 GROUPS = ("single", "pair", "none", "outside", "beside", "alloy")
@@ -99,12 +98,8 @@ def run_case(job: tuple[str, tuple[str, ...], int]) -> dict[str, Any]:
 
 
 def off(model: Model, run: Run) -> float:
-    """Return how far a model is from a log, K rms."""
-    plant = native.Plant(3, 3)
-    plant.set_effects(model.effects)
-    plant.set_all(model.parameters)
-    shown = simulate_run(plant, run, run.ambient_c)
-    return float(np.sqrt(np.nanmean((run.temperature_c - shown) ** 2)))
+    """Return how far what `ninespring predict` says by a model is from a log, K rms."""
+    return float(np.sqrt(np.nanmean((run.temperature_c - predict(model, run)) ** 2)))
 
 
 def baseline(runs: list[Run], other: Run) -> float:
